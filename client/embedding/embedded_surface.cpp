@@ -3,26 +3,58 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace trocar::embedding {
 namespace {
 
-constexpr float kAtCorner = 1e-4f;    // shares of a fine triangle: as good as none
-constexpr float kOnEdge = 1e-3f;      // likewise, of a face
-constexpr float kSkirtShare = 0.12f;  // of the edge of a rim: so far a skirt reaches below it
-constexpr float kLeastFacing = 0.1f;  // cosine of a face that lies under a triangle
+constexpr float kAtCorner = 1e-4f;         // shares of a fine triangle: as good as none
+constexpr float kOnEdge = 1e-3f;           // likewise, of a face
+constexpr float kSkirtShare = 0.12f;       // of the edge of a rim: so far a skirt reaches below it
+constexpr float kLeastFacing = 0.1f;       // cosine of a face that lies under a triangle
+constexpr float kUnderSlackCells = 0.25f;  // a coarse face so near is under a fine triangle
 constexpr std::size_t kMostUnder = 256;
+constexpr std::size_t kMostLookedUnder = 16'384;  // cells and faces, for those under a triangle
 
 float mean_edge(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles) {
   double sum = 0;
   std::size_t count = 0;
   for (const auto& [a, b, c] : triangles) {
     if (a == b) continue;
-    sum += double{length(positions[b] - positions[a])};
-    ++count;
+    sum += double{length(positions[b] - positions[a])} +
+           double{length(positions[c] - positions[b])} +
+           double{length(positions[a] - positions[c])};
+    count += 3;
   }
   return count == 0 ? 1.0f : static_cast<float>(sum / static_cast<double>(count));
+}
+
+// Sums the normals of the triangles around each place: vertices there that differ in the picture's
+// place alone, along its seams, have one normal.
+std::vector<Vec3f> normals_of(const FineShape& shape) {
+  std::vector<Vec3f> normals(shape.positions.size());
+  for (const auto& [a, b, c] : shape.triangles) {
+    const Vec3f n =
+        cross(shape.positions[b] - shape.positions[a], shape.positions[c] - shape.positions[a]);
+    for (const std::uint32_t v : {a, b, c}) normals[v] += n * 1e6f;
+  }
+  std::vector<std::uint32_t> order(normals.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto place = [&](std::uint32_t v) {
+    const Vec3f& p = shape.positions[v];
+    return std::array<float, 3>{p.x, p.y, p.z};
+  };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t v, std::uint32_t w) {
+    return std::pair(place(v), v) < std::pair(place(w), w);
+  });
+  for (std::size_t first = 0, end = 0; first < order.size(); first = end) {
+    Vec3f sum;
+    for (; end < order.size() && place(order[end]) == place(order[first]); ++end)
+      sum += normals[order[end]];
+    for (std::size_t i = first; i < end; ++i) normals[order[i]] = normalized(sum, Vec3f{0, 1, 0});
+  }
+  return normals;
 }
 
 }  // namespace
@@ -51,14 +83,8 @@ bool EmbeddedSurface::EdgeSet::has(std::uint32_t a, std::uint32_t b) const {
 }
 
 EmbeddedSurface::EmbeddedSurface(FineShape shape) : shape_(std::move(shape)) {
-  shape_normals_.assign(shape_.positions.size(), Vec3f{});
-  for (const auto& [a, b, c] : shape_.triangles) {
-    const Vec3f n =
-        cross(shape_.positions[b] - shape_.positions[a], shape_.positions[c] - shape_.positions[a]);
-    for (const std::uint32_t v : {a, b, c}) shape_normals_[v] += n * 1e6f;
-  }
-  for (Vec3f& n : shape_normals_) n = normalized(n, Vec3f{0, 1, 0});
-  shape_grid_.build(shape_.positions, shape_.triangles, {},
+  shape_normals_ = normals_of(shape_);
+  shape_grid_.build(shape_.positions, shape_.triangles,
                     2 * mean_edge(shape_.positions, shape_.triangles));
   face_of_.assign(shape_.positions.size(), kNoFace);
   is_affected_.assign(shape_.triangles.size(), 0);
@@ -117,7 +143,8 @@ void EmbeddedSurface::find_affected() {
     return;
   }
   for (Box<float> box : changed_boxes_) {
-    box.grow(farthest_m_ + 2 * static_cast<float>(kRimSlackMetres));
+    box.grow(farthest_m_ + kUnderSlackCells * grid_.cell_m() +
+             2 * static_cast<float>(kRimSlackMetres));
     found_.clear();
     shape_grid_.find(box, found_);
     for (const std::uint32_t t : found_) add_affected(t);
@@ -173,7 +200,7 @@ void EmbeddedSurface::follow(const CoarseShape& coarse) {
   note_changes(coarse);
   if (rest_.empty()) return;
   is_stale_ = true;
-  grid_.build(rest_, coarse_, {}, mean_edge(rest_, coarse_));
+  grid_.build(rest_, coarse_, mean_edge(rest_, coarse_));
   edges_.clear(3 * faces_.size());
   for (const std::uint32_t face : faces_)
     for (std::size_t k = 0; k < 3; ++k) edges_.insert(coarse_[face][k], coarse_[face][(k + 1) % 3]);
@@ -203,15 +230,16 @@ void EmbeddedSurface::find_faces_under(std::uint32_t triangle, const Vec3f& char
   Box<float> box;
   for (const std::uint32_t v : shape_.triangles[triangle])
     box.include(shape_.positions[v] - vertices_[v].offset);
-  box.grow(0.02f * grid_.cell_m() + static_cast<float>(kRimSlackMetres));
+  box.grow(kUnderSlackCells * grid_.cell_m() + static_cast<float>(kRimSlackMetres));
   found_.clear();
-  grid_.find(box, found_);
+  grid_.find(box, found_, kMostLookedUnder);
   // In one order, so that who joins late gets the same parts.
   std::sort(found_.begin(), found_.end());
   under_.clear();
   faces_under_.clear();
   for (const std::uint32_t face : found_) {
-    if (under_.size() >= kMostUnder || !(dot(normal_of(face), chart) > kLeastFacing)) continue;
+    if (under_.size() >= kMostUnder) break;
+    if (!(dot(normal_of(face), chart) > kLeastFacing)) continue;
     under_.push_back(face);
     FaceUnder& under = faces_under_.emplace_back();
     for (std::size_t k = 0; k < 3; ++k) {

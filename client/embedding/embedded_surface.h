@@ -20,9 +20,10 @@
 //   vertices:   [fine, as given][of parts and skirts]
 //   triangles:  [whole][parts][skirts]
 //
-// follow(): cost linear in the coarse surface, with a small factor, and in the fine triangles near
-// what has changed. update(): linear in the coarse surface, and in the fine vertices that move.
-// Neither allocates once the surfaces have ceased to grow. Thread: render thread.
+// follow(): cost linear in both surfaces, with a small factor: all triangles are listed anew, but
+// only those near what has changed are bound and parted. update(): linear in both, too: each fine
+// vertex is looked at, and those whose carriers have moved are moved. Neither allocates once the
+// surfaces have ceased to grow. Thread: render thread.
 
 #include <array>
 #include <cstdint>

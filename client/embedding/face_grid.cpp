@@ -6,8 +6,10 @@
 namespace trocar::embedding {
 namespace {
 
-constexpr int kMostCells = 48;        // along a side
-constexpr float kMostReachCells = 2;  // farther away nothing is looked for
+constexpr int kMostCells = 48;                 // along a side
+constexpr float kMostReachCells = 2;           // farther away nothing is looked for
+constexpr std::uint64_t kMostCellsEach = 32;   // of a triangle, on average
+constexpr std::size_t kMostForNearest = 4096;  // triangles, for the nearest one
 
 bool has_area(const TriangleCorners& t) {
   return t[0] != t[1];
@@ -58,41 +60,61 @@ void FaceGrid::for_cells(const Box<float>& box, const Visit& visit) const {
   for (int z = low[2]; z <= high[2]; ++z)
     for (int y = low[1]; y <= high[1]; ++y)
       for (int x = low[0]; x <= high[0]; ++x)
-        visit(static_cast<std::size_t>((z * size_[1] + y) * size_[0] + x));
+        if (!visit(static_cast<std::size_t>((z * size_[1] + y) * size_[0] + x))) return;
 }
 
-void FaceGrid::build(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles,
-                     std::span<const std::uint8_t> is_left_out, float cell_m) {
-  positions_ = positions;
-  triangles_ = triangles;
-  const auto is_in = [&](std::size_t i) {
-    return has_area(triangles[i]) && (i >= is_left_out.size() || is_left_out[i] == 0);
-  };
-  const auto box_of = [&](std::size_t i) {
-    Box<float> box;
-    for (const std::uint32_t v : triangles[i]) box.include(positions[v]);
-    return box;
-  };
-  all_ = {};
-  for (std::size_t i = 0; i < triangles.size(); ++i)
-    if (is_in(i))
-      for (const std::uint32_t v : triangles[i]) all_.include(positions[v]);
+Box<float> FaceGrid::box_of(std::size_t triangle) const {
+  Box<float> box;
+  for (const std::uint32_t v : triangles_[triangle]) box.include(positions_[v]);
+  return box;
+}
+
+std::size_t FaceGrid::choose_cells(float cell_m) {
   const bool is_empty = all_.least.x > all_.most.x;
   const Vec3f extent = is_empty ? Vec3f{} : all_.most - all_.least;
   origin_ = is_empty ? Vec3f{} : all_.least;
   cell_m_ = std::max({cell_m, std::max({extent.x, extent.y, extent.z}) / kMostCells, 1e-6f});
-  size_ = {static_cast<int>(extent.x / cell_m_) + 1, static_cast<int>(extent.y / cell_m_) + 1,
-           static_cast<int>(extent.z / cell_m_) + 1};
-  const auto cells = static_cast<std::size_t>(size_[0] * size_[1] * size_[2]);
+  for (;; cell_m_ *= 2) {
+    size_ = {static_cast<int>(extent.x / cell_m_) + 1, static_cast<int>(extent.y / cell_m_) + 1,
+             static_cast<int>(extent.z / cell_m_) + 1};
+    const auto cells = static_cast<std::size_t>(size_[0] * size_[1] * size_[2]);
+    std::uint64_t met = 0;
+    for (std::size_t i = 0; i < triangles_.size() && cells > 1; ++i) {
+      if (!has_area(triangles_[i])) continue;
+      const Box<float> box = box_of(i);
+      const auto low = cell_of(box.least), high = cell_of(box.most);
+      std::uint64_t each = 1;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        each *= static_cast<std::uint64_t>(high[axis] - low[axis] + 1);
+      met += each;
+    }
+    if (met <= kMostCellsEach * triangles_.size() + cells) return cells;
+  }
+}
+
+void FaceGrid::build(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles,
+                     float cell_m) {
+  positions_ = positions;
+  triangles_ = triangles;
+  all_ = {};
+  for (const TriangleCorners& t : triangles)
+    if (has_area(t))
+      for (const std::uint32_t v : t) all_.include(positions[v]);
+  const std::size_t cells = choose_cells(cell_m);
   first_.assign(cells + 1, 0);
   for (std::size_t i = 0; i < triangles.size(); ++i)
-    if (is_in(i)) for_cells(box_of(i), [this](std::size_t cell) { ++first_[cell + 1]; });
+    if (has_area(triangles[i]))
+      for_cells(box_of(i), [this](std::size_t cell) {
+        ++first_[cell + 1];
+        return true;
+      });
   for (std::size_t cell = 0; cell < cells; ++cell) first_[cell + 1] += first_[cell];
   entries_.resize(first_[cells]);
   for (std::size_t i = 0; i < triangles.size(); ++i)
-    if (is_in(i))
+    if (has_area(triangles[i]))
       for_cells(box_of(i), [&](std::size_t cell) {
         entries_[first_[cell]++] = static_cast<std::uint32_t>(i);
+        return true;
       });
   // Each cell's first is now that of the next one.
   for (std::size_t cell = cells; cell > 0; --cell) first_[cell] = first_[cell - 1];
@@ -101,22 +123,28 @@ void FaceGrid::build(std::span<const Vec3f> positions, std::span<const TriangleC
   query_ = 0;
 }
 
-void FaceGrid::find(const Box<float>& box, std::vector<std::uint32_t>& found) const {
+void FaceGrid::find(const Box<float>& box, std::vector<std::uint32_t>& found,
+                    std::size_t most) const {
   if (!all_.overlaps(box)) return;
   ++query_;
+  std::size_t looked_at = 0;
   for_cells(box, [&](std::size_t cell) {
-    for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+    ++looked_at;
+    for (std::uint32_t i = first_[cell]; i < first_[cell + 1] && looked_at < most; ++i) {
+      ++looked_at;
       const std::uint32_t face = entries_[i];
       if (seen_[face] == query_) continue;
       seen_[face] = query_;
-      found.push_back(face);
+      if (box_of(face).overlaps(box)) found.push_back(face);
     }
+    return looked_at < most;
   });
 }
 
 FacePlace FaceGrid::nearest(const Vec3f& p, const Vec3f& normal) const {
   FacePlace best, any;
   if (entries_.empty()) return best;
+  std::size_t looked_at = 0;
   for (float reach = 0.25f * cell_m_;; reach *= 2) {
     Box<float> box;
     box.include(p);
@@ -128,7 +156,9 @@ FacePlace FaceGrid::nearest(const Vec3f& p, const Vec3f& normal) const {
       if (kept.face == kNoFace || is_nearer) kept = place;
     };
     for_cells(box, [&](std::size_t cell) {
-      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+      for (std::uint32_t i = first_[cell]; i < first_[cell + 1] && looked_at < kMostForNearest;
+           ++i) {
+        ++looked_at;
         const std::uint32_t face = entries_[i];
         if (seen_[face] == query_) continue;
         seen_[face] = query_;
@@ -139,9 +169,10 @@ FacePlace FaceGrid::nearest(const Vec3f& p, const Vec3f& normal) const {
         const Vec3f n = cross(positions_[b] - positions_[a], positions_[c] - positions_[a]);
         if (dot(n, normal) > 0) consider(best, place);
       }
+      return looked_at < kMostForNearest;
     });
     if (best.face != kNoFace && best.distance_m <= reach) return best;
-    if (reach <= kMostReachCells * cell_m_) continue;
+    if (reach <= kMostReachCells * cell_m_ && looked_at < kMostForNearest) continue;
     if (best.face == kNoFace) best = any;
     return best.distance_m <= 2 * reach ? best : FacePlace{};
   }

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -28,23 +29,30 @@ FacePlace nearest_on(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f
 
 class FaceGrid {
  public:
-  // Cells are about as large as `cell_m`, at most 48 along a side. Triangles without area (equal
-  // corners) and those with `is_left_out` are left out; their numbers stay. The positions and
-  // triangles must outlive the grid's use.
+  // Cells are about as large as `cell_m`, at most 48 along a side, and larger where triangles would
+  // meet more than some 32 each. Triangles without area (equal corners) are left out; their numbers
+  // stay. The positions and triangles must outlive the grid's use.
   void build(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles,
-             std::span<const std::uint8_t> is_left_out, float cell_m);
+             float cell_m);
 
-  // Appends the triangles whose cells meet the box, each once, in no order.
-  void find(const Box<float>& box, std::vector<std::uint32_t>& found) const;
+  // Appends the triangles whose own boxes meet the box, each once, in no order. Ends early once it
+  // has looked at `most` cells and triangles.
+  void find(const Box<float>& box, std::vector<std::uint32_t>& found,
+            std::size_t most = std::numeric_limits<std::size_t>::max()) const;
   // The nearest triangle that faces along `normal`, within 90 degrees; of any side if none does.
-  // kNoFace: there is none within about two cells. So a surface that is elsewhere, from a server
-  // that means harm, takes no longer than one that fits.
+  // kNoFace: there is none within about two cells. It looks at no more than some thousands, however
+  // many a server that means harm has put into a cell: then it is the nearest of those.
   FacePlace nearest(const Vec3f& p, const Vec3f& normal) const;
 
   float cell_m() const { return cell_m_; }
+  std::size_t entry_count() const { return entries_.size(); }  // triangles, in each of their cells
 
  private:
   std::array<int, 3> cell_of(const Vec3f& p) const;
+  Box<float> box_of(std::size_t triangle) const;
+  // Makes the cells so large that the triangles meet few of them; returns how many cells there are.
+  std::size_t choose_cells(float cell_m);
+  // Ends once `visit` returns false.
   template <typename Visit>
   void for_cells(const Box<float>& box, const Visit& visit) const;
 

@@ -1,9 +1,13 @@
 #include "client/render/fine_layer.h"
 
+#include <algorithm>
+
 #include "common/base/log.h"
 
 namespace trocar::render {
 namespace {
+
+static_assert(wire::kMostFinePictureSide == std::size_t{kMostImageSide});
 
 embedding::FineShape shape_of(const wire::FineSurface& fine) {
   embedding::FineShape shape;
@@ -70,6 +74,11 @@ void FineLayer::upload(std::span<const Vec3f> positions, std::span<const Tint> t
                        std::span<const float> covers) {
   if (!surface_) return;
   surface_->update(positions);
+  if (surface_->moved_count() == 0 && std::ranges::equal(tints, coarse_tints_) &&
+      std::ranges::equal(covers, coarse_covers_))
+    return;
+  coarse_tints_.assign(tints.begin(), tints.end());
+  coarse_covers_.assign(covers.begin(), covers.end());
   surface_->spread(tints, tints_);
   surface_->spread(covers, covers_);
   const auto at = surface_->positions(), normals = surface_->normals();

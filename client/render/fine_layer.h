@@ -29,7 +29,8 @@ class FineLayer {
   void follow(const std::shared_ptr<const wire::FineSurface>& fine,
               const embedding::CoarseShape& coarse, std::uint64_t topology_version);
   bool is_shown() const { return surface_.has_value(); }
-  // Moves it with the coarse vertices, m; tints and covers by blood are theirs.
+  // Moves it with the coarse vertices, m; tints and covers by blood are theirs. Nothing goes to the
+  // card if all are as they were.
   void upload(std::span<const Vec3f> positions, std::span<const Tint> tints,
               std::span<const float> covers);
   unsigned picture() const { return picture_.name(); }  // 0: it has none
@@ -51,6 +52,8 @@ class FineLayer {
   ImageTexture picture_;
   std::vector<RestVertex> rest_;
   std::vector<OrganVertex> vertices_;
+  std::vector<Tint> coarse_tints_;  // of the last upload, as are the covers
+  std::vector<float> coarse_covers_;
   std::vector<Tint> tints_;
   std::vector<float> covers_;
   GLuint array_ = 0, buffer_ = 0, rest_buffer_ = 0, index_buffer_ = 0;

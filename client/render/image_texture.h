@@ -17,8 +17,8 @@ class ImageTexture {
   ImageTexture(const ImageTexture&) = delete;
   ImageTexture& operator=(const ImageTexture&) = delete;
 
-  // A PNG or JPEG file. Error, and then there is no picture: it is neither, or larger than
-  // kMostImageSide.
+  // A PNG or JPEG file. Error, and then there is no picture: it is neither, larger than
+  // kMostImageSide, unpacks to more than 64 MiB, or has more than 100 scans.
   Status load(const std::string& bytes);
   void clear();
 

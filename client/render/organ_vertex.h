@@ -18,6 +18,7 @@ struct Tint {
   float r = 0, g = 0, b = 0, a = 0;
   Tint operator+(const Tint& o) const { return {r + o.r, g + o.g, b + o.b, a + o.a}; }
   Tint operator*(float s) const { return {r * s, g * s, b * s, a * s}; }
+  bool operator==(const Tint&) const = default;
 };
 
 struct OrganVertex {

@@ -10,6 +10,7 @@
 #include "common/base/ids.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
+#include "common/budget/message_budget.h"
 #include "common/wire/fine_surface.h"
 #include "common/wire/framing.h"
 #include "proto/organ.pb.h"
@@ -176,6 +177,13 @@ void ReplaySource::deliver_fine_surface(replica::MessageSink& sink) {
   const auto found = stream_->last_before(JournalTopic::Organ, first_tick());
   proto::Organ organ;
   if (!found || found->data.size() > kMaxOrganBytes) return;
+  if (Status fits =
+          check_budget(*proto::Organ::descriptor(), found->data, build_budget(found->data.size()));
+      !fits.ok()) {
+    log::warn("{}: organ: {}; it is drawn without a fine surface", stream_->path(),
+              fits.error().message);
+    return;
+  }
   if (!organ.ParseFromArray(found->data.data(), static_cast<int>(found->data.size()))) return;
   if (!organ.has_fine_surface()) return;
   auto surface = wire::read(organ.fine_surface());

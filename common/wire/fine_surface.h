@@ -25,6 +25,7 @@ namespace trocar::wire {
 
 inline constexpr std::size_t kMaxFineTriangles = 200'000, kMaxFineVertices = 300'000;
 inline constexpr std::size_t kMaxFinePictureBytes = 4 * 1024 * 1024;
+inline constexpr std::size_t kMostFinePictureSide = 2048;  // pixels
 inline constexpr std::size_t kFinePartBytes = 32 * 1024;
 inline constexpr std::uint32_t kMaxFineParts = 512;
 inline constexpr double kFineQuantumMetres = 0.5e-6;

@@ -262,6 +262,75 @@ TEST(EmbeddedSurface, OneThatIsElsewhereDoesNoHarm) {
   for (const Vec3f& p : slender.positions()) EXPECT_TRUE(is_finite(p));
 }
 
+// Slivers whose boxes fill all of space have a short first edge, or three long ones: as many as a
+// message may hold.
+TEST(EmbeddedSurface, SliversAcrossAllOfSpaceTakeLittleMemory) {
+  for (const bool is_first_edge_short : {true, false}) {
+    FineShape shape;
+    for (int i = 0; i < 1000; ++i) {
+      const float along = 1e-6f * static_cast<float>(i);
+      shape.positions.push_back({-1.9f + along, -1.9f, -1.9f});
+      shape.positions.push_back(is_first_edge_short ? Vec3f{-1.9f, -1.9f + along + 1e-6f, -1.9f}
+                                                    : Vec3f{1.9f, -1.9f + along, 1.9f});
+      shape.positions.push_back({1.9f, 1.9f - along, 1.9f});
+    }
+    for (std::uint32_t i = 0; i < 200'000; ++i) {
+      const std::uint32_t first = 3 * (i % 1000), last = 3 * ((i + i / 1000) % 1000) + 2;
+      shape.triangles.push_back({first, first + 1, last});
+    }
+    FaceGrid grid;
+    grid.build(shape.positions, shape.triangles, 1e-6f);
+    EXPECT_LE(grid.entry_count(), 32 * shape.triangles.size() + 49 * 49 * 49);
+    EmbeddedSurface surface(std::move(shape));
+    const Coarse coarse = liver_at_rest();
+    surface.follow(coarse.shape());
+    surface.update(coarse.rest);
+    for (const Vec3f& p : surface.positions()) ASSERT_TRUE(is_finite(p));
+  }
+}
+
+TEST(EmbeddedSurface, SeamOfAPictureIsNoCrease) {
+  FineShape fine = fine_liver();
+  const FineShape whole = fine;
+  // Every second triangle has vertices of its own, as if the picture began anew there.
+  fine.texture.assign(fine.positions.size(), {0, 0});
+  for (std::size_t t = 0; t < fine.triangles.size(); t += 2)
+    for (std::uint32_t& v : fine.triangles[t]) {
+      const Vec3f place = fine.positions[v];
+      v = static_cast<std::uint32_t>(fine.positions.size());
+      fine.positions.push_back(place);
+      fine.texture.push_back({1, 1});
+    }
+  EmbeddedSurface seamed(fine), smooth(whole);
+  const Coarse coarse = liver_at_rest();
+  for (EmbeddedSurface* surface : {&seamed, &smooth}) {
+    surface->follow(coarse.shape());
+    surface->update(coarse.rest);
+  }
+  std::vector<std::uint32_t> first(whole.positions.size(), kNoFace);  // of the copies of a vertex
+  for (std::size_t t = 0; t < whole.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = fine.triangles[t][k], w = whole.triangles[t][k];
+      if (first[w] == kNoFace) first[w] = v;
+      ASSERT_LT(length(seamed.normals()[v] - smooth.normals()[w]), 1e-4f);
+      ASSERT_EQ(seamed.carriers(v), seamed.carriers(first[w]));
+    }
+}
+
+TEST(FaceGrid, FindsNoFaceOfAnotherLobe) {
+  const std::vector<Vec3f> places{{0, 0, 0},    {1, 0, 0},    {0, 1, 0},
+                                  {0, 0, 0.5f}, {1, 0, 0.5f}, {0, 1, 0.5f}};
+  const std::vector<TriangleCorners> faces{{0, 1, 2}, {3, 4, 5}};
+  FaceGrid grid;
+  grid.build(places, faces, 2);
+  Box<float> box;
+  box.include({0.2f, 0.2f, 0});
+  box.grow(0.1f);
+  std::vector<std::uint32_t> found;
+  grid.find(box, found);
+  EXPECT_EQ(found, std::vector<std::uint32_t>{0});
+}
+
 TEST(EmbeddedSurface, MovesOnlyWhatMoves) {
   EmbeddedSurface surface(fine_liver());
   const Coarse coarse = liver_at_rest();

@@ -14,6 +14,34 @@
 namespace trocar::render {
 namespace {
 
+// A PNG file of one pixel, whose data unpack to `bytes` of zeros: one, and copies of the 258 before
+// (RFC 1951, 3.2.6).
+std::string png_that_unpacks_to(std::size_t bytes) {
+  std::string data("\x78\x01", 2);
+  unsigned kept = 0, bits = 0;
+  const auto put = [&](const char* code) {
+    for (; *code != 0; ++code) {
+      kept |= static_cast<unsigned>(*code - '0') << bits;
+      if (++bits < 8) continue;
+      data += static_cast<char>(kept);
+      kept = bits = 0;
+    }
+  };
+  put("110");       // the last block, of fixed codes
+  put("00110000");  // a byte of zero
+  for (std::size_t made = 1; made < bytes; made += 258) put("1100010100000");
+  put("000000000000000");  // its end
+  std::string file("\x89PNG\r\n\x1a\n");
+  const auto add = [&](const std::string& kind, const std::string& body) {
+    for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(body.size() >> shift);
+    file += kind + body + "sums";
+  };
+  add("IHDR", std::string("\0\0\0\1\0\0\0\1\x08\0\0\0\0", 13));
+  add("IDAT", data);
+  add("IEND", "");
+  return file;
+}
+
 class ImageTextureTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -62,6 +90,28 @@ TEST_F(ImageTextureTest, WhatIsTooLargeIsRefused) {
   EXPECT_TRUE(texture.load(png_of(kMostImageSide, 1)));
   EXPECT_FALSE(texture.load(png_of(kMostImageSide + 1, 1)));
   EXPECT_EQ(texture.name(), 0u);
+}
+
+TEST_F(ImageTextureTest, WhatUnpacksToTooMuchIsRefused) {
+  ImageTexture texture;
+  const auto small = texture.load(png_that_unpacks_to(1000));
+  EXPECT_TRUE(small) << small.error().message;
+  EXPECT_FALSE(texture.load(png_that_unpacks_to(std::size_t{80} << 20)));
+  EXPECT_EQ(texture.name(), 0u);
+}
+
+TEST_F(ImageTextureTest, JpegOfManyScansIsRefused) {
+  std::string jpeg;
+  for (const auto& picture : lesson::lesson_pictures())
+    if (picture.bytes.starts_with("\xff\xd8")) jpeg = picture.bytes;
+  ASSERT_FALSE(jpeg.empty());
+  const auto scan = jpeg.find("\xff\xda"), end = jpeg.rfind("\xff\xd9");
+  std::string many = jpeg.substr(0, end);
+  for (int i = 0; i < 100; ++i) many += jpeg.substr(scan, end - scan);
+  ImageTexture texture;
+  const Status loaded = texture.load(many + jpeg.substr(end));
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("more than 100 scans"), std::string::npos);
 }
 
 }  // namespace

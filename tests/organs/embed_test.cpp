@@ -25,7 +25,14 @@ surface::RawSurface raw_of(const mesh::TetMesh& mesh, const Vec3d& offset_m) {
 }
 
 EmbedOptions options_of(const Vec3d& offset_m) {
-  return {.unit = mesh::Unit::Millimetre, .offset_m = offset_m, .picture = {}, .name = "fine.obj"};
+  return {.unit_m = 1e-3, .offset_m = offset_m, .picture = {}, .name = "fine.obj"};
+}
+
+std::string png_header(unsigned width, unsigned height) {
+  std::string file("\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR", 16);
+  for (const unsigned side : {width, height})
+    for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(side >> shift);
+  return file;
 }
 
 class Embed : public testing::Test {
@@ -71,7 +78,7 @@ TEST_F(Embed, OneThatIsElsewhereIsRefusedWithThePlace) {
 TEST_F(Embed, TheOrgansFileKeepsItAndItsHashDoesNotKnowIt) {
   const auto hash = organ::organ_hash(organ_);
   auto options = options_of(offset_);
-  options.picture = "\x89PNG\r\n\x1a\nrest";
+  options.picture = png_header(2048, 2048);
   organ_.fine_surface = embed(raw_of(organ_.mesh, offset_), organ_.mesh, options)->surface;
   EXPECT_EQ(organ::organ_hash(organ_), hash);
   const auto read_back = organ::unpack_organ(organ::pack_organ(organ_));
@@ -81,6 +88,54 @@ TEST_F(Embed, TheOrgansFileKeepsItAndItsHashDoesNotKnowIt) {
   const auto broken = organ::unpack_organ(organ::pack_organ(organ_));
   ASSERT_FALSE(broken.ok());
   EXPECT_NE(broken.error().message.find("FineSurface.corner_step"), std::string::npos);
+}
+
+TEST_F(Embed, VerticesOfDroppedTrianglesAreNotKept) {
+  auto raw = raw_of(organ_.mesh, offset_);
+  const auto whole = embed(raw, organ_.mesh, options_of(offset_));
+  // Three places in a line: near, but no surface.
+  const Vec3d from = raw.positions[raw.triangles[0][0].value];
+  const auto first = static_cast<std::uint32_t>(raw.positions.size());
+  raw.positions.insert(raw.positions.end(), {from + Vec3d{0.01, 0, 0}, from + Vec3d{0.02, 0, 0},
+                                             from + Vec3d{0.03, 0, 0}});
+  raw.triangles.push_back({NodeIndex(first), NodeIndex(first + 1), NodeIndex(first + 2)});
+  raw.corner_texture.push_back({});
+  const auto fine = embed(raw, organ_.mesh, options_of(offset_));
+  ASSERT_TRUE(fine.ok()) << fine.error().message;
+  EXPECT_EQ(fine->surface, whole->surface);
+  ASSERT_EQ(fine->warnings.size(), 1u);
+  EXPECT_EQ(fine->warnings[0], "dropped 1 triangles without an area");
+}
+
+TEST_F(Embed, PicturesThatNoClientWouldShowAreRefused) {
+  auto options = options_of(offset_);
+  const auto raw = raw_of(organ_.mesh, offset_);
+  const auto error = [&](const std::string& picture) {
+    options.picture = picture;
+    const auto fine = embed(raw, organ_.mesh, options);
+    return fine.ok() ? std::string() : fine.error().message;
+  };
+  const std::string jpeg_start("\xff\xd8\xff\xe0\0\4ab\xff", 9);
+  const auto jpeg = [&](const char* size) {
+    return jpeg_start + std::string("\xff\xc2\0\x0b\x08", 5) + std::string(size, 4) + "rest";
+  };
+  EXPECT_EQ(error(png_header(2048, 1)), "");
+  EXPECT_EQ(error(jpeg("\x08\0\0\x20")), "");
+  EXPECT_EQ(error(png_header(2049, 1)),
+            "fine.obj: the picture has 2049 x 1 pixels, may have 1 to 2048 along a side");
+  EXPECT_EQ(error(jpeg("\x08\1\0\x20")),
+            "fine.obj: the picture has 32 x 2049 pixels, may have 1 to 2048 along a side");
+  EXPECT_EQ(error(png_header(0, 1)),
+            "fine.obj: the picture has 0 x 1 pixels, may have 1 to 2048 along a side");
+  EXPECT_NE(error("\xff\xd8\xff and no more").find("its header is broken"), std::string::npos);
+}
+
+TEST_F(Embed, WrongPlacesInAPictureAreRefused) {
+  auto raw = raw_of(organ_.mesh, offset_);
+  raw.texture_fault = "fine.obj:6: refers to texture coordinate 5, the file has 2";
+  const auto fine = embed(raw, organ_.mesh, options_of(offset_));
+  ASSERT_FALSE(fine.ok());
+  EXPECT_EQ(fine.error().message, raw.texture_fault);
 }
 
 TEST_F(Embed, IsCarriedToAnotherRestPose) {

@@ -73,6 +73,23 @@ TEST_F(ReplaySourceTest, AFineSurfaceThatIsNoneIsLeftOut) {
   ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
 }
 
+TEST_F(ReplaySourceTest, AnOrganThatTakesTooMuchMemoryIsLeftOut) {
+  proto::Organ many;
+  for (int i = 0; i < 400'000; ++i) many.add_region();
+  const std::string more = many.SerializeAsString();
+  const Truth truth = record({.frames = 100,
+                              .has_fine_surface = true,
+                              .tamper = [&](journal::JournalTopic topic, Frame, Bytes& bytes) {
+                                if (topic == journal::JournalTopic::Organ)
+                                  bytes.insert(bytes.end(), more.begin(), more.end());
+                                return true;
+                              }});
+  Player player(path_);
+  player.step(0);
+  EXPECT_EQ(player.replica.fine_surface(), nullptr);
+  ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
+}
+
 TEST_F(ReplaySourceTest, UnevenPollsMissNothing) {
   const Truth truth = record({.frames = 400, .cut_at = 133});
   Player player(path_);

@@ -20,8 +20,10 @@ Status embed_surface(const EmbedCommand& command, organ::Organ& organ) {
   const auto* raw = std::get_if<surface::RawSurface>(&*file);
   if (raw == nullptr)
     return Error{ErrorCode::BadFile, command.file + ": --embed needs a surface, it has tetrahedra"};
-  embed::EmbedOptions options{
-      .unit = command.unit, .offset_m = organ.source_offset_m, .picture = {}, .name = command.file};
+  embed::EmbedOptions options{.unit_m = command.unit_m,
+                              .offset_m = organ.source_offset_m,
+                              .picture = {},
+                              .name = command.file};
   if (!command.picture.empty()) {
     auto picture = formats::read_foreign_file(command.picture);
     if (!picture) return picture.error();

@@ -5,14 +5,13 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/organs/mesh/raw_tets.h"
 #include "server/organs/organ/organ.h"
 
 namespace trocar::app {
 
 struct EmbedCommand {
   std::string file, picture;  // empty: none
-  mesh::Unit unit = mesh::Unit::Metre;
+  double unit_m = 1;          // of the surface's numbers
 };
 
 // Reads the files and gives the organ its fine surface, and says on stderr how it fits. Nothing is

@@ -301,9 +301,10 @@ Status run_import(const Options& options) {
   give_regions_its_material(imported->organ);
   if (auto changed = change_organ(options, true, imported->organ); !changed) return changed;
   give_regions_its_material(imported->organ);
-  if (auto embedded = embed_surface(
-          {.file = options.embedded, .picture = options.embedded_picture, .unit = *unit},
-          imported->organ);
+  if (auto embedded = embed_surface({.file = options.embedded,
+                                     .picture = options.embedded_picture,
+                                     .unit_m = imported->unit_m},
+                                    imported->organ);
       !embedded)
     return embedded;
   for (const std::string& note : imported->notes)

@@ -251,6 +251,7 @@ Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::str
 Result<ImportedOrgan> import_labels(label_map::LabelMap map, const std::filesystem::path& path,
                                     const ImportOptions& options) {
   ImportedOrgan result;
+  result.unit_m = map.unit_m;
   auto imported = fill_labels(std::move(map), path.string(), options, result.notes);
   if (!imported) return imported.error();
   return make_organ(std::move(*imported), path, options, options.unit_is_said, std::move(result));
@@ -264,6 +265,7 @@ Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
     return map ? import_labels(std::move(*map), path, options) : map.error();
   }
   ImportedOrgan result;
+  result.unit_m = metres_of(options.unit);
   auto imported = read_mesh(path, options, result.notes);
   if (!imported) return imported.error();
   return make_organ(std::move(*imported), path, options, true, std::move(result));

@@ -36,6 +36,7 @@ struct ImportOptions {
 
 struct ImportedOrgan {
   organ::Organ organ;
+  double unit_m = 1;                  // of the file's numbers
   std::vector<std::string> warnings;  // one line each: what was repaired
   std::vector<std::string> notes;     // one line each: how a surface was filled, regions, sets
 };

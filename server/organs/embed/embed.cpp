@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "server/organs/embed/picture_size.h"
 #include "server/organs/surface/triangle_tree.h"
 
 namespace trocar::embed {
@@ -53,18 +54,37 @@ class Vertices {
   std::map<std::array<std::int32_t, 5>, std::uint32_t> known_;
 };
 
+using Place = std::array<std::int32_t, 3>;  // on the grid
+
+Vec3d metres(const Place& place) {
+  return Vec3d{double(place[0]), double(place[1]), double(place[2])} * wire::kFineQuantumMetres;
+}
+
 Vec3d position(const wire::FineSurface& surface, std::uint32_t vertex) {
-  const auto& [x, y, z] = surface.quanta[vertex];
-  return Vec3d{double(x), double(y), double(z)} * wire::kFineQuantumMetres;
+  return metres(surface.quanta[vertex]);
+}
+
+Vec3d normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  return cross(b - a, c - a);
 }
 
 Vec3d normal(const wire::FineSurface& surface, const std::array<std::uint32_t, 3>& t) {
-  const Vec3d a = position(surface, t[0]);
-  return cross(position(surface, t[1]) - a, position(surface, t[2]) - a);
+  return normal(position(surface, t[0]), position(surface, t[1]), position(surface, t[2]));
 }
 
 Error bad(const EmbedOptions& options, const std::string& what) {
   return {ErrorCode::BadFile, options.name + ": " + what};
+}
+
+Status check_picture(const EmbedOptions& options) {
+  if (options.picture.empty()) return {};
+  const auto size = picture_size(options.picture);
+  if (!size) return bad(options, "the picture is neither PNG nor JPEG, or its header is broken");
+  const auto [width, height] = *size;
+  if (std::min(width, height) > 0 && std::max(width, height) <= wire::kMostFinePictureSide)
+    return {};
+  return bad(options, fmt::format("the picture has {} x {} pixels, may have 1 to {} along a side",
+                                  width, height, wire::kMostFinePictureSide));
 }
 
 // Compares with the mesh: how far away, and which way it looks.
@@ -86,7 +106,7 @@ Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine&
   }
   if (result.farthest_m > most) {
     const auto in_file = [&](double c) {
-      return std::round(c / metres_of(options.unit) * 1e6) / 1e6 + 0.0;  // no minus before zero
+      return std::round(c / options.unit_m * 1e6) / 1e6 + 0.0;  // no minus before zero
     };
     const Vec3d place = worst + options.offset_m;
     return bad(options,
@@ -114,30 +134,33 @@ Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& 
   if (raw.triangles.size() > wire::kMaxFineTriangles)
     return bad(options, fmt::format("has {} triangles, a fine surface may have {}",
                                     raw.triangles.size(), wire::kMaxFineTriangles));
+  if (!raw.texture_fault.empty()) return Error{ErrorCode::BadFile, raw.texture_fault};
+  if (Status fits = check_picture(options); !fits.ok()) return fits.error();
   EmbeddedFine result;
   result.surface.picture = options.picture;
   Vertices vertices(result.surface);
-  const double unit = metres_of(options.unit);
+  const double unit = options.unit_m;
   std::size_t dropped = 0;
   for (std::size_t i = 0; i < raw.triangles.size(); ++i) {
-    std::array<std::uint32_t, 3> corners{};
+    std::array<Place, 3> places{};
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3d p = raw.positions[raw.triangles[i][k].value] * unit - options.offset_m;
       if (!is_finite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kFarthest_m)
         return bad(options, fmt::format("triangle {}: a corner is more than 1.9 m from the organ's "
                                         "centre: is it in the same unit?",
                                         i + 1));
+      places[k] = wire::fine_quanta(p);
+    }
+    if (!(length(normal(metres(places[0]), metres(places[1]), metres(places[2]))) > 0)) {
+      ++dropped;
+      continue;
+    }
+    auto& corners = result.surface.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
       std::array<std::int32_t, 2> texture{};
       if (!raw.corner_texture.empty()) texture = texture_quanta(raw.corner_texture[i][k]);
-      corners[k] =
-          vertices.at(wire::fine_quanta(p), raw.corner_texture.empty() ? nullptr : &texture);
+      corners[k] = vertices.at(places[k], raw.corner_texture.empty() ? nullptr : &texture);
     }
-    const auto& [a, b, c] = corners;
-    const bool has_area = a != b && b != c && c != a && length(normal(result.surface, corners)) > 0;
-    if (has_area)
-      result.surface.triangles.push_back(corners);
-    else
-      ++dropped;
   }
   if (dropped > 0)
     result.warnings.push_back(fmt::format("dropped {} triangles without an area", dropped));

@@ -5,8 +5,8 @@
 //
 // Each vertex must be near the surface of the organ's mesh, by which clients move it: at most half
 // of the mean edge there. Repaired, with a warning: triangles that repeat a corner or have no area
-// are dropped, vertices at the same place and with the same place in a picture are welded, unused
-// ones dropped, and a surface that looks inward is turned.
+// are dropped, vertices at the same place and with the same place in a picture are welded, those of
+// no triangle that is kept are dropped, and a surface that looks inward is turned.
 
 #include <span>
 #include <string>
@@ -15,7 +15,6 @@
 #include "common/base/result.h"
 #include "common/math/vec3.h"
 #include "common/wire/fine_surface.h"
-#include "server/organs/mesh/raw_tets.h"
 #include "server/organs/mesh/tet_mesh.h"
 #include "server/organs/surface/raw_surface.h"
 
@@ -24,7 +23,7 @@ namespace trocar::embed {
 inline constexpr double kMostEdgesAway = 0.5;  // of the mean edge of the mesh's surface
 
 struct EmbedOptions {
-  mesh::Unit unit = mesh::Unit::Metre;
+  double unit_m = 1;    // of the file's numbers
   Vec3d offset_m;       // of the organ's origin in the file's frame
   std::string picture;  // a PNG or JPEG file's bytes; empty: none
   std::string name;     // it starts each error, usually the file's path
@@ -37,7 +36,8 @@ struct EmbeddedFine {
 };
 
 // `mesh`: the organ's, with its boundary. Error: a vertex is too far away, which names the place;
-// limits of wire::FineSurface; there is nothing to embed.
+// limits of wire::FineSurface; a picture larger than wire::kMostFinePictureSide, or whose header
+// does not tell its size; places in a picture that are wrong; there is nothing to embed.
 Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& mesh,
                            const EmbedOptions& options);
 

@@ -1,8 +1,9 @@
 #pragma once
 
 // Reader of the vertices and faces of Wavefront OBJ surfaces. Faces of more than three corners are
-// split around their first one. Materials, groups, normals and texture coordinates are read over;
-// free-form curves and surfaces are refused.
+// split around their first one. Materials, groups and normals are read over. Texture coordinates
+// that are wrong are left out, and RawSurface::texture_fault says so. Free-form curves and surfaces
+// are refused.
 //
 // Source: Wavefront Advanced Visualizer manual, appendix B1.
 

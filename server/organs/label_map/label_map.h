@@ -20,6 +20,7 @@ struct LabelMap {
   // head, z to the front. The steps are at right angles to one another.
   Vec3d origin_m;
   std::array<Vec3d, 3> steps_m{};
+  double unit_m = 1e-3;     // in which the file gives them
   std::string orientation;  // towards which sides i, j and k run, such as "RAS" or "LPS"
   std::vector<std::pair<std::uint16_t, std::string>> names;  // that the file gives to labels
   std::vector<std::string> warnings;

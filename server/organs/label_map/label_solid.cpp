@@ -96,7 +96,8 @@ Status LabelSolid::crop(const std::vector<std::uint16_t>& labels, const std::str
       return Error{ErrorCode::BadFile,
                    name + ": no voxel has label " + std::to_string(label) + " (--labels)"};
   if (high[0] < 0) return Error{ErrorCode::BadFile, name + ": all voxels have label 0"};
-  LabelMap cut{{}, {}, map_.origin_m, map_.steps_m, map_.orientation, map_.names, map_.warnings};
+  LabelMap cut{{},         {},           map_.origin_m, map_.steps_m, map_.unit_m, map_.orientation,
+               map_.names, map_.warnings};
   std::uint64_t count = 1;
   for (std::size_t d = 0; d < 3; ++d) {
     cut.size[d] = high[d] - low[d] + 1 + 2 * kMargin;

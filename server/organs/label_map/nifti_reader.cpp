@@ -40,6 +40,7 @@ class NiftiReader {
     for (auto step : {&NiftiReader::check_header, &NiftiReader::read_size, &NiftiReader::read_unit,
                       &NiftiReader::read_place, &NiftiReader::read_labels})
       if (auto s = (this->*step)(); !s) return s.error();
+    map_.unit_m = scale_;
     return std::move(map_);
   }
 

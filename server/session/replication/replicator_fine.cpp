@@ -1,5 +1,9 @@
-// The organ's fine surface, for who has joined: a part at a time, each after the one before has
-// arrived, so that no frame waits behind more than one part.
+// The organ's fine surface, for who has joined: a part at a time, each after a frame newer than the
+// one before has been acknowledged. Where frames come on the same stream, the part has arrived by
+// then, and no frame waits behind more than one part. Where they come as datagrams, which overtake
+// it, only the bytes that are still to be acknowledged tell: no part is added to a queue of them.
+
+#include <algorithm>
 
 #include "server/session/replication/replicator_client.h"
 
@@ -12,7 +16,8 @@ void Replicator::give_fine_surface(Client& client) {
   const bool is_paused = newest == client.fine_frame;
   if (!has_arrived && !is_paused) return;
   // The newest frame may still be there, but no queue.
-  if (connections_.outstanding_bytes(client.id) > options_.skip_above_bytes / 4) return;
+  const auto limit = std::max(options_.skip_above_bytes / 4, 2 * encoder_.typical_frame_bytes());
+  if (connections_.outstanding_bytes(client.id) > limit) return;
   if (!send(client, options_.fine_surface[client.fine_parts])) return;  // the next time
   ++client.fine_parts;
   client.fine_frame = newest;
