@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/nearest_point.h"
+
 namespace trocar::embedding {
 namespace {
 
@@ -17,33 +19,10 @@ bool has_area(const TriangleCorners& t) {
 
 }  // namespace
 
-// Ericson 2005, section 5.1.5.
 FacePlace nearest_on(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
-  const auto at = [&](float v, float w) {
-    FacePlace place{.face = 0, .weight = {1 - v - w, v, w}};
-    place.distance_m = length(a + (b - a) * v + (c - a) * w - p);
-    return place;
-  };
-  const Vec3f ab = b - a, ac = c - a, ap = p - a;
-  const float d1 = dot(ab, ap), d2 = dot(ac, ap);
-  if (d1 <= 0 && d2 <= 0) return at(0, 0);
-  const Vec3f bp = p - b;
-  const float d3 = dot(ab, bp), d4 = dot(ac, bp);
-  if (d3 >= 0 && d4 <= d3) return at(1, 0);
-  const float vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d1 / std::max(d1 - d3, 1e-30f), 0);
-  const Vec3f cp = p - c;
-  const float d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6) return at(0, 1);
-  const float vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(0, d2 / std::max(d2 - d6, 1e-30f));
-  const float va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const float w = (d4 - d3) / std::max((d4 - d3) + (d5 - d6), 1e-30f);
-    return at(1 - w, w);
-  }
-  const float whole = std::max(va + vb + vc, 1e-30f);
-  return at(vb / whole, vc / whole);
+  const Vec3f w = nearest_weights(p, a, b, c);
+  return {
+      .face = 0, .weight = {w.x, w.y, w.z}, .distance_m = length(a * w.x + b * w.y + c * w.z - p)};
 }
 
 std::array<int, 3> FaceGrid::cell_of(const Vec3f& p) const {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/tissue/contact/nearest_point.h"
+#include "common/math/nearest_point.h"
 #include "tests/support/random.h"
 
 namespace trocar::testing {
@@ -20,7 +20,7 @@ TEST(NearestPoint, WeightsAreNeverNegativeAndSumToOne) {
     const auto t = static_cast<float>(random.unit());
     const Vec3f up = cross(b - a, c - a) * static_cast<float>(random.between(-3, 3));
     const Vec3f p = b * t + c * (1 - t) + up;
-    const Vec3f w = contact::nearest_weights(p, a, b, c);
+    const Vec3f w = nearest_weights(p, a, b, c);
     ASSERT_TRUE(w.x >= 0 && w.y >= 0 && w.z >= 0) << w.x << " " << w.y << " " << w.z;
     ASSERT_NEAR(w.x + w.y + w.z, 1, 1e-6);
   }

@@ -29,7 +29,7 @@
 #include <utility>
 
 #include "common/base/tick.h"
-#include "server/tissue/contact/nearest_point.h"
+#include "common/math/nearest_point.h"
 #include "server/tissue/contact/surface.h"
 
 namespace trocar::contact {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "server/tissue/contact/nearest_point.h"
+#include "common/math/nearest_point.h"
 
 namespace trocar::touch {
 namespace {
@@ -172,7 +172,7 @@ void UndentedSurface::follow(const world::World& world, const wire::SurfaceLayou
 
 Vec3f UndentedSurface::nearest_on(const Triangle& triangle, const Vec3f& at) {
   const auto& [a, b, c] = triangle.at;
-  const Vec3f w = contact::nearest_weights(at, a, b, c);
+  const Vec3f w = nearest_weights(at, a, b, c);
   return a * w.x + b * w.y + c * w.z;
 }
 

@@ -4,7 +4,7 @@
 
 #include "common/math/vec3.h"
 
-namespace trocar::contact {
+namespace trocar {
 
 // Barycentric weights of the point of a triangle closest to p: none is negative, and
 // their sum is 1 but for rounding (Ericson, Real-Time Collision
@@ -43,4 +43,4 @@ inline Vec3f nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, con
   return inside / (inside.x + inside.y + inside.z);
 }
 
-}  // namespace trocar::contact
+}  // namespace trocar
