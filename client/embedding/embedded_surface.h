@@ -12,7 +12,7 @@
 // the fine surface.
 //
 // A fine triangle is whole while all around it goes on: its corners ride, each on its own face.
-// Where a rim of a wound passes, it is parted along the coarse faces under it (parting.h), and each
+// It is parted where a rim of a wound passes, along the coarse faces under it (parting.h), and each
 // part rides on one face. What the surface is follows from the coarse one as it is now and from
 // nothing before, so who joins late sees the same. A skirt joins a rim of the fine surface with
 // that of the coarse one, where the wall of the wound begins.
