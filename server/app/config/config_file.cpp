@@ -100,6 +100,24 @@ Result<std::vector<CLI::ConfigItem>> ConfigReader::read(const std::string& text,
 
 }  // namespace
 
+Status check_option(CLI::App& app, const std::string& key, const std::string& text,
+                    const std::function<Status()>& finish) {
+  const auto refused = [&key](const std::string& message) {
+    for (const auto& name : {"--" + key + ": ", key + ": "})
+      if (message.starts_with(name)) return Error{ErrorCode::Usage, message.substr(name.size())};
+    return Error{ErrorCode::Usage, message};
+  };
+  auto* option = app.get_option("--" + key);
+  try {
+    option->add_result(text);
+    option->run_callback();
+  } catch (const CLI::ParseError& error) {
+    return refused(error.what());
+  }
+  const auto finished = finish();
+  return finished ? finished : refused(finished.error().message);
+}
+
 Result<bool> parse_with_config(CLI::App& app, int argc, char** argv, CheckOption check,
                                OptionOrigins& origins, const char* example) {
   app.config_formatter(std::make_shared<ConfigReader>(app, std::move(check), origins, example));

@@ -17,6 +17,11 @@ namespace trocar::app {
 // Checks the text of one option alone: its form, its limits.
 using CheckOption = std::function<Status(const std::string& key, const std::string& text)>;
 
+// Gives the text to that option of an `app` made for this, then calls `finish`, which checks
+// options beside each other. The error's message does not begin with the option's name.
+Status check_option(CLI::App& app, const std::string& key, const std::string& text,
+                    const std::function<Status()>& finish);
+
 // Parses a command line that may name such a file, into the options of `app`. Returns false if the
 // program is done (after --help or --version). The file may not have unknown keys, values of the
 // wrong kind and those that `check` refuses; errors name file, line and key, and point at

@@ -344,20 +344,7 @@ void CommandLine::add_config_options() {
 }
 
 Status CommandLine::check(const std::string& key, const std::string& text) {
-  const auto refused = [&key](const std::string& message) {
-    for (const auto& name : {"--" + key + ": ", key + ": "})
-      if (message.starts_with(name)) return Error{ErrorCode::Usage, message.substr(name.size())};
-    return Error{ErrorCode::Usage, message};
-  };
-  auto* option = app_.get_option("--" + key);
-  try {
-    option->add_result(text);
-    option->run_callback();
-  } catch (const CLI::ParseError& error) {
-    return refused(error.what());
-  }
-  const auto finished = finish();
-  return finished ? finished : refused(finished.error().message);
+  return check_option(app_, key, text, [this] { return finish(); });
 }
 
 Status CommandLine::finish() {

@@ -166,22 +166,9 @@ void CommandLine::add_limit_options() {
 }
 
 Status CommandLine::check(const std::string& key, const std::string& text) {
-  const auto refused = [&key](const std::string& message) {
-    for (const auto& name : {"--" + key + ": ", key + ": "})
-      if (message.starts_with(name)) return Error{ErrorCode::Usage, message.substr(name.size())};
-    return Error{ErrorCode::Usage, message};
-  };
-  auto* option = app_.get_option("--" + key);
-  try {
-    option->add_result(text);
-    option->run_callback();
-  } catch (const CLI::ParseError& error) {
-    return refused(error.what());
-  }
   // Whether TLS may be left out depends on another option.
-  if (key == "insecure-loopback") return {};
-  const auto finished = finish();
-  return finished ? finished : refused(finished.error().message);
+  const bool is_alone = key != "insecure-loopback";
+  return check_option(app_, key, text, [&] { return is_alone ? finish() : Status(); });
 }
 
 Status CommandLine::finish() {
