@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "common/base/tick.h"
 #include "common/base/timing.h"
 #include "common/lesson/course.h"
+#include "common/wire/framing.h"
 #include "common/wire/hand_report.h"
 #include "common/wire/haptic_patch.h"
 #include "common/wire/lesson.h"
