@@ -31,6 +31,12 @@ struct LabelMap {
                (static_cast<std::size_t>(j) +
                 static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(k));
   }
+  // The place p, m, counted in voxels from the centre of the first.
+  Vec3d voxel_of(const Vec3d& p) const {
+    const Vec3d d = p - origin_m;
+    const auto along = [&d](const Vec3d& step) { return dot(d, step) / length_squared(step); };
+    return {along(steps_m[0]), along(steps_m[1]), along(steps_m[2])};
+  }
   double voxel_volume_m3() const {
     return length(steps_m[0]) * length(steps_m[1]) * length(steps_m[2]);
   }

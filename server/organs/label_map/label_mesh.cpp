@@ -3,75 +3,189 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
+#include <cmath>
+#include <limits>
+#include <optional>
 #include <utility>
 
+#include "server/organs/label_map/label_field.h"
+#include "server/organs/label_map/label_fit.h"
+#include "server/organs/mesh/conform.h"
 #include "server/organs/mesh/fill_field.h"
+#include "server/organs/mesh/match_volumes.h"
 
 namespace trocar::label_map {
 namespace {
 
-constexpr int kSamples = 5;  // along an edge of a tet, 35 in all
+constexpr double kGoodCount = 0.05, kAcceptableCount = 0.15;  // shares of the asked number
+constexpr int kAttempts = 4;
+constexpr double kStepsOverSurface = 1.5;  // area of the surface of voxels over the true one
+constexpr double kKeptInMesh = 0.8;        // share of a label's voxels below which the report warns
+constexpr double kMissedVolume = 0.05;     // share of a label's volume from which on it warns
 
-// The label of most of a tet's volume, by points spread evenly in it; the lower of equal ones.
-std::uint16_t label_of(const LabelSolid& solid, const mesh::TetMesh& mesh, const mesh::Tet& tet) {
-  std::map<std::uint16_t, int> counts;
-  for (int a = 0; a < kSamples; ++a)
-    for (int b = 0; a + b < kSamples; ++b)
-      for (int c = 0; a + b + c < kSamples; ++c) {
-        const int d = kSamples - 1 - a - b - c;
-        const double weights[4] = {a + 0.25, b + 0.25, c + 0.25, d + 0.25};
-        Vec3d p;
-        for (std::size_t i = 0; i < 4; ++i)
-          p += mesh.rest_positions[tet[i].value] * (weights[i] / kSamples);
-        if (const auto label = solid.label_at(p); label != 0) ++counts[label];
-      }
-  if (counts.empty()) return 0;
-  return std::ranges::max_element(counts, {}, &std::pair<const std::uint16_t, int>::second)->first;
+using Names = std::vector<std::pair<std::uint16_t, std::string>>;
+
+struct Filled {
+  mesh::TetMesh mesh;
+  double spacing_m = 0;
+  // Two labels or more:
+  std::vector<std::uint16_t> tet_labels;
+  std::size_t steps = 0;
+};
+
+std::string name_of(std::uint16_t label, const Names& names) {
+  const auto named = std::ranges::find(names, label, &std::pair<std::uint16_t, std::string>::first);
+  return named == names.end() ? "label " + std::to_string(label) : named->second;
 }
 
-// Regions, the largest first: where tets could belong to several by their nodes, the smallest, such
-// as a tumour, goes before. Tets beside the solid belong to none.
-void add_regions(const LabelSolid& solid,
-                 const std::vector<std::pair<std::uint16_t, std::string>>& names, LabelMesh& out) {
-  const auto& mesh = out.imported.mesh;
-  std::map<std::uint16_t, std::vector<NodeIndex>> nodes;
-  std::map<std::uint16_t, double> volumes;
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-    const auto label = label_of(solid, mesh, mesh.tets[t]);
-    volumes[label] += tet_volume(mesh, TetIndex(t));
-    nodes[label].insert(nodes[label].end(), mesh.tets[t].begin(), mesh.tets[t].end());
-  }
+// The largest first: where tets could belong to several by their nodes, the smallest, such as a
+// tumour, goes before.
+std::vector<std::uint16_t> largest_first(const LabelSolid& solid) {
   auto labels = solid.labels();
   std::ranges::stable_sort(labels, std::ranges::greater{},
                            [&](std::uint16_t label) { return solid.volume_of(label); });
-  for (const auto label : labels) {
-    const auto named =
-        std::ranges::find(names, label, &std::pair<std::uint16_t, std::string>::first);
-    mesh::NamedNodes region{named == names.end() ? "label " + std::to_string(label) : named->second,
-                            std::move(nodes[label])};
-    out.notes.push_back(fmt::format("{}: {:.4g} ml, the map's {:.4g} ml", region.name,
-                                    1e6 * volumes[label], 1e6 * solid.volume_of(label)));
-    std::sort(region.nodes.begin(), region.nodes.end());
-    region.nodes.erase(std::unique(region.nodes.begin(), region.nodes.end()), region.nodes.end());
-    if (region.nodes.empty())
-      out.imported.warnings.push_back(region.name + " is too small for the mesh, and left out");
-    else
-      out.imported.regions.push_back(std::move(region));
+  return labels;
+}
+
+std::vector<NodeIndex> nodes_of(const Filled& filled, std::uint16_t label) {
+  std::vector<std::uint8_t> is_there(filled.mesh.node_count(), 0);
+  for (std::size_t t = 0; t < filled.mesh.tets.size(); ++t)
+    if (filled.tet_labels[t] == label)
+      for (const NodeIndex node : filled.mesh.tets[t]) is_there[node.value] = 1;
+  std::vector<NodeIndex> nodes;
+  for (std::size_t n = 0; n < is_there.size(); ++n)
+    if (is_there[n]) nodes.emplace_back(n);
+  return nodes;
+}
+
+// A tet belongs to the last region that holds its nodes, as everywhere where organs are used.
+std::vector<std::vector<NodeIndex>> settle_regions(const std::vector<std::uint16_t>& labels,
+                                                   Filled& filled) {
+  std::vector<std::vector<NodeIndex>> regions;
+  for (const auto label : labels) regions.push_back(nodes_of(filled, label));
+  for (std::size_t r = 0; r < labels.size(); ++r) {
+    std::vector<std::uint8_t> is_inside(filled.mesh.node_count(), 0);
+    for (const NodeIndex node : regions[r]) is_inside[node.value] = 1;
+    for (std::size_t t = 0; t < filled.mesh.tets.size(); ++t)
+      if (std::ranges::all_of(filled.mesh.tets[t],
+                              [&](NodeIndex n) { return is_inside[n.value] != 0; }))
+        filled.tet_labels[t] = labels[r];
   }
+  return regions;
+}
+
+Result<Filled> fill(const LabelSolid& solid, int nodes) {
+  auto filled = mesh::fill_field([&](const Vec3d& p) { return solid.distance(p); }, solid.box(),
+                                 solid.volume_m3(), solid.surface_m2() / kStepsOverSurface, nodes);
+  if (!filled) return filled.error();
+  return Filled{std::move(filled->mesh), filled->spacing_m, {}, 0};
+}
+
+// The interfaces take nodes, too: the lattice gets as many fewer.
+Result<Filled> fill_with_interfaces(const LabelSolid& solid, int nodes) {
+  const LabelField field(solid);
+  std::optional<Filled> best;
+  double best_error = std::numeric_limits<double>::infinity();
+  int lattice_nodes = nodes;
+  for (int i = 0; i < kAttempts; ++i) {
+    auto filled =
+        mesh::fill_field([&](const Vec3d& p) { return solid.distance(p); }, solid.box(),
+                         solid.volume_m3(), solid.surface_m2() / kStepsOverSurface, lattice_nodes);
+    if (!filled) {
+      if (best) break;
+      return filled.error();
+    }
+    const double grown = filled->grown_m;
+    auto conforming = mesh::conform_to_labels(
+        filled->mesh, filled->spacing_m, [&](const Vec3d& p) { return field(p); },
+        [&](const Vec3d& p) { return solid.distance(p) - grown; });
+    if (!conforming) return conforming.error();
+    const double ratio = static_cast<double>(conforming->mesh.node_count()) / nodes;
+    if (std::abs(ratio - 1) < best_error) {
+      best_error = std::abs(ratio - 1);
+      best = Filled{std::move(conforming->mesh), filled->spacing_m,
+                    std::move(conforming->tet_labels), conforming->steps};
+    }
+    if (best_error < kGoodCount) break;
+    const int next = std::clamp(static_cast<int>(std::lround(lattice_nodes / ratio)),
+                                mesh::kMinFillNodes, mesh::kMaxFillNodes);
+    if (next == lattice_nodes) break;
+    lattice_nodes = next;
+  }
+  if (best_error > kAcceptableCount)
+    return Error{ErrorCode::BadFile,
+                 fmt::format("cannot be filled with about {} nodes, the nearest number is {}: ask "
+                             "for another number (--nodes)",
+                             nodes, best->mesh.node_count())};
+  return std::move(*best);
+}
+
+// A tube needs a spacing of half its diameter.
+std::string advice(const LabelFit& fit, const LabelSolid& solid) {
+  const double spacing = fit.thickness_m / 2;
+  const double needed = 1.3 * 2 * solid.volume_m3() / (spacing * spacing * spacing);
+  return needed > mesh::kMaxFillNodes
+             ? fmt::format("no number of nodes up to {} is enough", mesh::kMaxFillNodes)
+             : fmt::format("ask for more nodes, such as --nodes {:.0f}",
+                           1000 * std::ceil(needed / 1000));
+}
+
+void warn_of_losses(const LabelFit& fit, const std::string& name, const LabelSolid& solid,
+                    std::vector<std::string>& warnings) {
+  const bool is_in_pieces = fit.mesh_pieces > fit.map_pieces;
+  if (!is_in_pieces && fit.kept >= kKeptInMesh &&
+      std::abs(fit.mesh_m3 / fit.map_m3 - 1) < kMissedVolume)
+    return;
+  std::string text =
+      fmt::format("{}: {:.0f} % of its voxels lie in it", name, std::floor(100 * fit.kept));
+  if (is_in_pieces)
+    text += fmt::format(", it is in {} pieces, the map's in {}", fit.mesh_pieces, fit.map_pieces);
+  warnings.push_back(text + ": it is too thin for the mesh; " + advice(fit, solid));
+}
+
+void add_regions(const LabelSolid& solid, const Names& names, Filled& filled, LabelMesh& out) {
+  const auto labels = largest_first(solid);
+  const auto regions = settle_regions(labels, filled);
+  std::vector<std::pair<std::uint16_t, double>> volumes;
+  for (std::size_t l = labels.size(); l-- > 1;)
+    volumes.emplace_back(labels[l], solid.volume_of(labels[l]));
+  mesh::match_volumes(filled.mesh, filled.tet_labels, volumes,
+                      kMaxInterfaceShift * filled.spacing_m, mesh::conforming_bound());
+  const auto fits = fit_of_labels(solid, filled.mesh, filled.tet_labels);
+  for (std::size_t l = 0; l < labels.size(); ++l) {
+    const auto name = name_of(labels[l], names);
+    const auto& fit = *std::ranges::find(fits, labels[l], &LabelFit::label);
+    out.notes.push_back(fmt::format("{}: {:.4g} ml, {:+.2f} % of the map's {:.4g} ml", name,
+                                    1e6 * fit.mesh_m3, 100 * (fit.mesh_m3 / fit.map_m3 - 1),
+                                    1e6 * fit.map_m3));
+    if (regions[l].empty()) {
+      out.imported.warnings.push_back(
+          name + " is too small for the mesh, and left out: " + advice(fit, solid));
+      continue;
+    }
+    warn_of_losses(fit, name, solid, out.imported.warnings);
+    out.imported.regions.push_back({name, regions[l]});
+  }
+  out.notes.push_back(
+      fmt::format("interfaces follow faces of tets; through {} tets of {} one passes", filled.steps,
+                  filled.mesh.tets.size()));
 }
 
 }  // namespace
 
-Result<LabelMesh> mesh_labels(const LabelSolid& solid, int nodes,
-                              const std::vector<std::pair<std::uint16_t, std::string>>& names,
+Result<LabelMesh> mesh_labels(const LabelSolid& solid, int nodes, const Names& names,
                               const std::string& name) {
-  auto filled = mesh::fill_field([&](const Vec3d& p) { return solid.distance(p); }, solid.box(),
-                                 solid.volume_m3(), solid.surface_m2() / 1.5, nodes);
+  const bool has_interfaces = solid.labels().size() > 1;
+  auto filled = has_interfaces ? fill_with_interfaces(solid, nodes) : fill(solid, nodes);
   if (!filled) return Error{ErrorCode::BadFile, name + ": " + filled.error().message};
   LabelMesh out;
-  out.imported.mesh = std::move(filled->mesh);
   out.imported.warnings = solid.warnings();
+  std::vector<std::string> of_labels;
+  if (has_interfaces) {
+    add_regions(solid, names, *filled, out);
+    of_labels = std::exchange(out.notes, {});
+  }
+  auto& mesh = out.imported.mesh = std::move(filled->mesh);
   const auto& map = solid.map();
   const double mm = 1e3;
   out.notes.push_back(fmt::format(
@@ -79,18 +193,17 @@ Result<LabelMesh> mesh_labels(const LabelSolid& solid, int nodes,
       "the head, z the front",
       map.orientation, mm * length(map.steps_m[0]), mm * length(map.steps_m[1]),
       mm * length(map.steps_m[2])));
-  const double volume = total_volume(out.imported.mesh);
-  const auto angles = dihedral_range(out.imported.mesh);
+  const double volume = total_volume(mesh);
+  const auto angles = dihedral_range(mesh);
   out.notes.push_back(fmt::format("filled with {} nodes and {} tets, spacing {:.2f} mm",
-                                  out.imported.mesh.node_count(), out.imported.mesh.tets.size(),
-                                  mm * filled->spacing_m));
+                                  mesh.node_count(), mesh.tets.size(), mm * filled->spacing_m));
   out.notes.push_back(
       fmt::format("volume {:.4g} ml, {:+.2f} % of the map's {:.4g} ml; dihedral angles {:.1f} to "
                   "{:.1f} degrees",
                   1e6 * volume, 100 * (volume / solid.volume_m3() - 1), 1e6 * solid.volume_m3(),
                   angles.min_deg, angles.max_deg));
-  if (solid.labels().size() > 1) add_regions(solid, names, out);
-  out.imported.offset_m = centre_on_origin(out.imported.mesh);
+  std::ranges::move(of_labels, std::back_inserter(out.notes));
+  out.imported.offset_m = centre_on_origin(mesh);
   return out;
 }
 

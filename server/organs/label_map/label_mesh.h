@@ -2,8 +2,10 @@
 
 // Tetrahedra fill the solid of a label map, and each label gets a region.
 //
-// The surface of the mesh follows the solid's; interfaces between labels run along faces of tets,
-// each of which takes the label of most of its volume. They are as coarse as the mesh.
+// The surface of the mesh follows the solid's, and faces of tets the interfaces between labels
+// (mesh/conform.h). Interfaces are then moved by a small part of the spacing, so that each label
+// has its volume (mesh/match_volumes.h). Where a label is thinner than the mesh, warnings say how
+// much of it is there, and in how many pieces.
 
 #include <string>
 #include <vector>
@@ -13,6 +15,9 @@
 #include "server/organs/mesh/raw_tets.h"
 
 namespace trocar::label_map {
+
+// Spacings by which a node of an interface moves at most for the labels' volumes.
+inline constexpr double kMaxInterfaceShift = 0.15;
 
 struct LabelMesh {
   mesh::ImportedMesh imported;     // centred; regions are there if the solid has two labels or more

@@ -211,14 +211,8 @@ void LabelSolid::find_distances() {
     });
 }
 
-Vec3d LabelSolid::voxel_of(const Vec3d& p) const {
-  const Vec3d d = p - map_.origin_m;
-  const auto along = [&](const Vec3d& step) { return dot(d, step) / length_squared(step); };
-  return {along(map_.steps_m[0]), along(map_.steps_m[1]), along(map_.steps_m[2])};
-}
-
 double LabelSolid::distance(const Vec3d& p) const {
-  const Vec3d v = voxel_of(p);
+  const Vec3d v = map_.voxel_of(p);
   const std::array<double, 3> at{v.x, v.y, v.z};
   std::array<int, 3> low{};
   std::array<double, 3> share{};
@@ -245,7 +239,7 @@ double LabelSolid::distance(const Vec3d& p) const {
 }
 
 std::uint16_t LabelSolid::label_at(const Vec3d& p) const {
-  const Vec3d v = voxel_of(p);
+  const Vec3d v = map_.voxel_of(p);
   const int i = static_cast<int>(std::lround(v.x)), j = static_cast<int>(std::lround(v.y)),
             k = static_cast<int>(std::lround(v.z));
   if (i < 0 || j < 0 || k < 0 || i >= map_.size[0] || j >= map_.size[1] || k >= map_.size[2])

@@ -47,7 +47,6 @@ class LabelSolid {
   Status keep_largest_body(const std::string& name);
   void measure();
   void find_distances();
-  Vec3d voxel_of(const Vec3d& p) const;
 
   LabelMap map_;                   // cut to the solid and a margin; what does not belong to it is 0
   std::vector<float> distance_m_;  // one a voxel

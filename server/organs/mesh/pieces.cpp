@@ -151,7 +151,7 @@ std::size_t drop_unused_nodes(TetMesh& mesh) {
   return removed;
 }
 
-void renumber_along_z(TetMesh& mesh) {
+std::vector<std::uint32_t> renumber_along_z(TetMesh& mesh) {
   drop_unused_nodes(mesh);
   std::vector<std::uint32_t> order(mesh.node_count());
   std::iota(order.begin(), order.end(), std::uint32_t{0});
@@ -180,6 +180,7 @@ void renumber_along_z(TetMesh& mesh) {
     std::rotate(tet.begin() + 1, std::min_element(tet.begin() + 1, tet.end()), tet.end());
   }
   std::sort(mesh.tets.begin(), mesh.tets.end());
+  return order;
 }
 
 }  // namespace trocar::mesh

@@ -30,7 +30,8 @@ std::size_t drop_touching_parts(TetMesh& mesh);
 std::size_t drop_unused_nodes(TetMesh& mesh);
 
 // Drops unused nodes and renumbers the rest in order of (z, y, x), tets by their smallest node, so
-// that neighbours lie close in memory whatever made the mesh.
-void renumber_along_z(TetMesh& mesh);
+// that neighbours lie close in memory whatever made the mesh. Returns for each node the number that
+// it had among the used ones.
+std::vector<std::uint32_t> renumber_along_z(TetMesh& mesh);
 
 }  // namespace trocar::mesh
