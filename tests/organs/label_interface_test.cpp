@@ -22,6 +22,9 @@ namespace {
 using label_map::LabelMap;
 
 constexpr double kVoxel_m = 0.0015;
+constexpr std::array<int, 3> kSize{90, 70, 64};
+const std::array<Vec3d, 3> kSteps{Vec3d{kVoxel_m, 0, 0}, Vec3d{0, kVoxel_m, 0},
+                                  Vec3d{0, 0, kVoxel_m}};
 constexpr std::uint16_t kLiver = 1, kVessel = 2, kLump = 3;
 constexpr double kLumpRadius_m = 0.014;
 constexpr double kBend_m = 0.05;  // radius of the vessel's centre line
@@ -38,25 +41,27 @@ double to_lump(const Vec3d& p) {
   return length(p - kLumpCentre) - kLumpRadius_m;
 }
 
-LabelMap map_of(std::array<int, 3> size, const std::function<int(const Vec3d&)>& label) {
+// steps: of a voxel along i, j and k, m. The middle of the map is at the origin.
+LabelMap map_of(std::array<int, 3> size, const std::array<Vec3d, 3>& steps,
+                const std::function<int(const Vec3d&)>& label) {
   LabelMap map;
   map.size = size;
   map.labels.resize(std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]));
-  const Vec3d origin = Vec3d{size[0] - 1.0, size[1] - 1.0, size[2] - 1.0} * (-kVoxel_m / 2);
-  EXPECT_TRUE(
-      set_place(origin, {Vec3d{kVoxel_m, 0, 0}, Vec3d{0, kVoxel_m, 0}, Vec3d{0, 0, kVoxel_m}}, map)
-          .ok());
+  Vec3d origin;
+  for (std::size_t d = 0; d < 3; ++d) origin -= steps[d] * ((size[d] - 1) / 2.0);
+  EXPECT_TRUE(set_place(origin, steps, map).ok());
   for (int k = 0; k < size[2]; ++k)
     for (int j = 0; j < size[1]; ++j)
       for (int i = 0; i < size[0]; ++i)
         map.labels[map.index(i, j, k)] = static_cast<std::uint16_t>(
-            label(origin + Vec3d{double(i), double(j), double(k)} * kVoxel_m));
+            label(origin + steps[0] * double(i) + steps[1] * double(j) + steps[2] * double(k)));
   map.names = {{kLiver, "liver"}, {kVessel, "vessel"}, {kLump, "lump"}};
   return map;
 }
 
-LabelMap liver_map(double vessel_radius_m) {
-  return map_of({90, 70, 64}, [&](const Vec3d& p) {
+LabelMap liver_map(double vessel_radius_m, std::array<int, 3> size = kSize,
+                   const std::array<Vec3d, 3>& steps = kSteps) {
+  return map_of(size, steps, [&](const Vec3d& p) {
     if (in_liver(p) > 0) return 0;
     if (to_vessel(p, vessel_radius_m) < 0) return int{kVessel};
     return to_lump(p) < 0 ? int{kLump} : int{kLiver};
@@ -142,8 +147,10 @@ void expect_fit(const ImportedOrgan& result, const Figures& figures, const Label
     whole += volume;
   }
   EXPECT_NEAR(total_volume(result.organ.mesh), whole, 0.01 * whole);
+  const double voxel =
+      std::max({length(map.steps_m[0]), length(map.steps_m[1]), length(map.steps_m[2])});
   EXPECT_LE(figures.greatest_cells * figures.spacing_m,
-            kVoxel_m + label_map::kMaxInterfaceShift * figures.spacing_m);
+            voxel + label_map::kMaxInterfaceShift * figures.spacing_m);
 }
 
 double to_interfaces(const Vec3d& p) {
@@ -170,9 +177,20 @@ TEST(LabelInterface, SameMapGivesTheSameOrgan) {
   EXPECT_EQ(organ_hash(imported(map, 2000).organ), organ_hash(imported(map, 2000).organ));
 }
 
+// Slices are thicker than pixels are wide, and stand at an angle.
+TEST(LabelInterface, IsFollowedInSlices) {
+  const double s = std::sin(0.5), c = std::cos(0.5), wide = 0.001, thick = 0.003;
+  const auto map = liver_map(0.008, {140, 96, 48},
+                             {Vec3d{c, 0, s} * wide, Vec3d{0, wide, 0}, Vec3d{-s, 0, c} * thick});
+  const auto result = imported(map, 4000);
+  const auto figures = figures_of(result, to_interfaces);
+  print(result, figures);
+  expect_fit(result, figures, map);
+}
+
 TEST(LabelInterface, ALumpTouchesAVessel) {
   const Vec3d centre{0, 0.01, 0};
-  const auto map = map_of({90, 70, 64}, [&](const Vec3d& p) {
+  const auto map = map_of(kSize, kSteps, [&](const Vec3d& p) {
     if (in_liver(p) > 0) return 0;
     if (to_vessel(p, 0.008) < 0) return int{kVessel};
     return length(p - centre) < 0.016 ? int{kLump} : int{kLiver};

@@ -163,7 +163,9 @@ void add_regions(const LabelSolid& solid, const Names& names, Filled& filled, La
           name + " is too small for the mesh, and left out: " + advice(fit, solid));
       continue;
     }
-    warn_of_losses(fit, name, solid, out.imported.warnings);
+    // The largest gets what the others lose, and theirs is the warning.
+    if (l > 0 || fit.mesh_pieces > fit.map_pieces)
+      warn_of_losses(fit, name, solid, out.imported.warnings);
     out.imported.regions.push_back({name, regions[l]});
   }
   out.notes.push_back(
