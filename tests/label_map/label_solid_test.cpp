@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "server/organs/label_map/label_mesh.h"
 #include "server/organs/label_map/nifti_reader.h"
@@ -87,6 +88,27 @@ TEST(LabelMesh, HasTheVolumeOfTheMapAndItsRegions) {
   for (const NodeIndex node : imported.regions[1].nodes) {
     const Vec3d p = imported.mesh.rest_positions[node.value] + imported.offset_m;
     EXPECT_LT(length(p - Vec3d{-0.0405, 0.0245, 0.0245}), 0.009 + 0.005);
+  }
+}
+
+// Nothing is a worse map than noise: each voxel has a label of its own.
+TEST(LabelMesh, NoiseKeepsTheBoundsOfShape) {
+  std::mt19937 random(1);
+  for (const unsigned labels : {2u, 5u}) {
+    auto map = parse_nifti(
+        nifti({16, 16, 16}, 3, [&](int, int, int) { return int(1 + random() % labels); }),
+        std::nullopt, "a.nii");
+    ASSERT_TRUE(map.ok());
+    const auto solid = LabelSolid::make(std::move(*map), {}, "a.nii");
+    ASSERT_TRUE(solid.ok()) << solid.error().message;
+    const auto result = mesh_labels(*solid, 4000, {}, "a.nii");
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    const auto& mesh = result->imported.mesh;
+    EXPECT_TRUE(mesh::validate(mesh)) << labels;
+    const auto angles = mesh::dihedral_range(mesh);
+    EXPECT_GE(angles.min_deg, mesh::kStuffingMinDihedral_deg) << labels;
+    EXPECT_LE(angles.max_deg, mesh::kStuffingMaxDihedral_deg) << labels;
+    EXPECT_NEAR(mesh::total_volume(mesh), solid->volume_m3(), 0.01 * solid->volume_m3()) << labels;
   }
 }
 

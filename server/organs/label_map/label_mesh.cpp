@@ -18,7 +18,8 @@ namespace trocar::label_map {
 namespace {
 
 constexpr double kGoodCount = 0.05, kAcceptableCount = 0.15;  // shares of the asked number
-constexpr int kAttempts = 4;
+constexpr int kAttempts = 6;
+constexpr double kFewer = 0.93;  // share of the lattice's nodes where a number gives no mesh
 constexpr double kStepsOverSurface = 1.5;  // area of the surface of voxels over the true one
 constexpr double kKeptInMesh = 0.8;        // share of a label's voxels below which the report warns
 constexpr double kMissedVolume = 0.05;     // share of a label's volume from which on it warns
@@ -86,14 +87,16 @@ Result<Filled> fill_with_interfaces(const LabelSolid& solid, int nodes) {
   const LabelField field(solid);
   std::optional<Filled> best;
   double best_error = std::numeric_limits<double>::infinity();
+  std::optional<Error> failure;
   int lattice_nodes = nodes;
   for (int i = 0; i < kAttempts; ++i) {
     auto filled =
         mesh::fill_field([&](const Vec3d& p) { return solid.distance(p); }, solid.box(),
                          solid.volume_m3(), solid.surface_m2() / kStepsOverSurface, lattice_nodes);
     if (!filled) {
-      if (best) break;
-      return filled.error();
+      failure = failure.value_or(filled.error());
+      lattice_nodes = std::max(static_cast<int>(kFewer * lattice_nodes), mesh::kMinFillNodes);
+      continue;
     }
     const double grown = filled->grown_m;
     auto conforming = mesh::conform_to_labels(
@@ -107,11 +110,14 @@ Result<Filled> fill_with_interfaces(const LabelSolid& solid, int nodes) {
                     std::move(conforming->tet_labels), conforming->steps};
     }
     if (best_error < kGoodCount) break;
-    const int next = std::clamp(static_cast<int>(std::lround(lattice_nodes / ratio)),
+    // Half steps end a swing between two lattices.
+    const double step = i < kAttempts / 2 ? ratio : std::sqrt(ratio);
+    const int next = std::clamp(static_cast<int>(std::lround(lattice_nodes / step)),
                                 mesh::kMinFillNodes, mesh::kMaxFillNodes);
     if (next == lattice_nodes) break;
     lattice_nodes = next;
   }
+  if (!best) return *failure;
   if (best_error > kAcceptableCount)
     return Error{ErrorCode::BadFile,
                  fmt::format("cannot be filled with about {} nodes, the nearest number is {}: ask "
