@@ -28,6 +28,7 @@
 #include "proto/wire.pb.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/dicom/dicom_reader.h"
 #include "server/organs/formats/mesh_file.h"
 #include "server/organs/formats/tetgen_reader.h"
 #include "server/organs/label_map/label_solid.h"
@@ -218,13 +219,28 @@ Status read_loads(journal::SessionJournal& journal) {
   return {};
 }
 
+// A file in memory, for readers that take a path.
+class MemoryFile {
+ public:
+  explicit MemoryFile(BytesView bytes) : file_(memfd_create("fuzz", 0)) {
+    TROCAR_ASSERT(file_ >= 0);
+    const bool is_written =
+        write(file_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+    TROCAR_ASSERT(is_written);
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  ~MemoryFile() { close(file_); }
+
+  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
+
+ private:
+  int file_;
+};
+
 bool decode_journal(BytesView bytes) {
-  const int file = memfd_create("journal", 0);
-  TROCAR_ASSERT(file >= 0);
-  const bool is_written =
-      write(file, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
-  TROCAR_ASSERT(is_written);
-  const auto journal = journal::SessionJournal::open("/proc/self/fd/" + std::to_string(file));
+  const MemoryFile file(bytes);
+  const auto journal = journal::SessionJournal::open(file.path());
   bool is_accepted = checked(journal);
   if (is_accepted) {
     auto& read = **journal;
@@ -241,7 +257,6 @@ bool decode_journal(BytesView bytes) {
     is_accepted &= checked(read.surface_key_before(kLast));
     is_accepted &= checked(read.participants_before(kLast));
   }
-  close(file);
   return is_accepted;
 }
 
@@ -284,6 +299,11 @@ constexpr char kGmsh[] = "a.msh", kVtk[] = "a.vtk", kVtu[] = "a.vtu", kMedit[] =
 bool decode_nifti(BytesView bytes) {
   auto map = label_map::parse_nifti(text_of(bytes), std::nullopt, "a.nii");
   return checked(map) && checked(label_map::LabelSolid::make(std::move(*map), {}, "a.nii"));
+}
+
+bool decode_dicom(BytesView bytes) {
+  const MemoryFile file(bytes);
+  return dicom::is_dicom(file.path()) && checked(dicom::read_dicom(file.path()));
 }
 
 // A zero stands between the two files.
@@ -358,6 +378,7 @@ constexpr Decoder kDecoders[] = {
     {"obj", decode_mesh<kObj>},
     {"ply", decode_mesh<kPly>},
     {"nifti", decode_nifti},
+    {"dicom", decode_dicom},
     {"script", decode_script},
     {"scenario", decode_scenario},
     {"lesson", decode_lesson},

@@ -20,6 +20,7 @@
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/bleeding/blood.h"
 #include "server/tissue/world/surface_layout.h"
+#include "tests/dicom/dicom_sample.h"
 #include "tests/journal/session_samples.h"
 #include "tests/papers/synthetic_reduction.h"
 #include "tests/reduce/small_organ.h"
@@ -78,6 +79,20 @@ void save_surfaces() {
   proto::FineSurface fine_message;
   wire::write(fine, fine_message);
   save("fine_surface", "painted_triangle", fine_message);
+}
+
+void save_dicom() {
+  fs::create_directories(root / "dicom");
+  for (const bool is_slice : {false, true}) {
+    DcmFileFormat file;
+    if (is_slice)
+      dicom::testing::make_slice(*file.getDataset(), 2);
+    else
+      dicom::testing::make_segmentation(*file.getDataset());
+    const auto path = root / "dicom" / (is_slice ? "slice" : "segmentation");
+    TROCAR_ASSERT(file.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
+    std::printf("%s\n", path.c_str());
+  }
 }
 
 void save_slices() {
@@ -208,6 +223,7 @@ int main(int argc, char** argv) {
   save_slices();
   save_blood();
   save_handshakes();
+  save_dicom();
   const auto block = reduce::testing::block(3, 3, 3);
   save("organ", "block", organ::encode_organ(block));
   save("organ", "block.organ", organ::pack_organ(block));
