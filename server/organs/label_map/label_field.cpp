@@ -11,23 +11,29 @@ LabelField::LabelField(const LabelSolid& solid) : map_(solid.map()), labels_(sol
   const std::array<std::size_t, 3> size{std::size_t(map_.size[0]), std::size_t(map_.size[1]),
                                         std::size_t(map_.size[2])};
   const std::array<std::size_t, 3> stride{1, size[0], size[0] * size[1]};
-  std::vector<std::size_t> front, next;
-  for (std::size_t i = 0; i < labels_.size(); ++i)
-    if (labels_[i] != 0) front.push_back(i);
-  // Layer by layer from the solid outward; within a layer by the voxels' order.
+  const auto for_each_neighbour = [&](std::uint32_t at, const auto& visit) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      const auto place = at / stride[d] % size[d];
+      if (place > 0) visit(at - static_cast<std::uint32_t>(stride[d]));
+      if (place + 1 < size[d]) visit(at + static_cast<std::uint32_t>(stride[d]));
+    }
+  };
+  // Layer by layer from the solid outward, within a layer in order of the voxels.
+  std::vector<std::uint32_t> front, next;
+  for (std::uint32_t at = 0; at < labels_.size(); ++at) {
+    bool is_at_border = false;
+    if (labels_[at] != 0)
+      for_each_neighbour(at, [&](std::uint32_t to) { is_at_border |= labels_[to] == 0; });
+    if (is_at_border) front.push_back(at);
+  }
   while (!front.empty()) {
     next.clear();
     for (const auto at : front)
-      for (std::size_t d = 0; d < 3; ++d) {
-        const auto place = at / stride[d] % size[d];
-        const auto spread = [&](std::size_t to) {
-          if (labels_[to] != 0) return;
-          labels_[to] = labels_[at];
-          next.push_back(to);
-        };
-        if (place > 0) spread(at - stride[d]);
-        if (place + 1 < size[d]) spread(at + stride[d]);
-      }
+      for_each_neighbour(at, [&](std::uint32_t to) {
+        if (labels_[to] != 0) return;
+        labels_[to] = labels_[at];
+        next.push_back(to);
+      });
     std::swap(front, next);
   }
 }

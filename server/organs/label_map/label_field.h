@@ -18,7 +18,8 @@
 
 namespace trocar::label_map {
 
-// The solid must outlive it. Takes two bytes a voxel. A const one may be used by any thread.
+// The solid must outlive it. Takes two bytes a voxel, and four for each at the surface. A const one
+// may be used by any thread.
 class LabelField {
  public:
   explicit LabelField(const LabelSolid& solid);

@@ -74,10 +74,10 @@ class MapPieces {
     const std::array<double, 3> h{length(map_.steps_m[0]), length(map_.steps_m[1]),
                                   length(map_.steps_m[2])};
     std::size_t count = 0;
-    queue_.assign(1, from);
+    queue_.assign(1, static_cast<std::uint32_t>(from));
     is_done_[from] = true;
     while (!queue_.empty()) {
-      const auto at = queue_.back();
+      const std::size_t at = queue_.back();
       queue_.pop_back();
       ++count;
       // The margin keeps neighbours inside the map.
@@ -87,7 +87,7 @@ class MapPieces {
             surface_m2 += h[(d + 1) % 3] * h[(d + 2) % 3] / kVoxelsOverSurface;
           } else if (!is_done_[next]) {
             is_done_[next] = true;
-            queue_.push_back(next);
+            queue_.push_back(static_cast<std::uint32_t>(next));
           }
         }
     }
@@ -96,7 +96,7 @@ class MapPieces {
 
   const LabelMap& map_;
   std::vector<bool> is_done_;
-  std::vector<std::size_t> queue_;
+  std::vector<std::uint32_t> queue_;
 };
 
 std::size_t pieces_of(const mesh::TetMesh& mesh, const std::vector<std::uint16_t>& tet_labels,
