@@ -126,9 +126,10 @@ Result<Filled> fill_with_interfaces(const LabelSolid& solid, int nodes) {
   return std::move(*best);
 }
 
-// A tube needs a spacing of half its diameter.
+// A tube comes out whole where it is 1.2 spacings across.
+constexpr double kNeededSpacings = 1.4;
 std::string advice(const LabelFit& fit, const LabelSolid& solid) {
-  const double spacing = fit.thickness_m / 2;
+  const double spacing = fit.thickness_m / kNeededSpacings;
   const double needed = 1.3 * 2 * solid.volume_m3() / (spacing * spacing * spacing);
   return needed > mesh::kMaxFillNodes
              ? fmt::format("no number of nodes up to {} is enough", mesh::kMaxFillNodes)

@@ -18,6 +18,10 @@ constexpr double kPullLong = 0.24999, kPullShort = 0.42;
 constexpr double kLongEdge = 0.93;  // spacings; the lattice has edges of 0.87 and 1
 // Moved nodes leave room for the splits that follow.
 constexpr double kMovedMinDihedral_deg = 14, kMovedMaxDihedral_deg = 155;
+// A label hidden in the middle of an edge gets a node where it has so much of the edge. With it a
+// tube 1.2 spacings across comes out whole, without it in three pieces.
+constexpr double kHiddenShare = 0.3;
+constexpr double kHiddenMinDihedral_deg = 25, kHiddenMaxDihedral_deg = 150;
 constexpr double kSamePlace = 0.1;  // share of an edge
 constexpr int kHalvings = 24, kRounds = 6;
 constexpr double kSlope = 0.02;     // spacings over which the slope of the surface is measured
@@ -74,6 +78,7 @@ class Conformer {
     labels_.resize(stars_.node_count());
     for (std::uint32_t n = 0; n < stars_.node_count(); ++n)
       labels_[n].add(label_at_(stars_.position(NodeIndex(n))));
+    split_hidden_edges();
     pull_nodes();
     for (int round = 0; round < kRounds; ++round)
       if (!split_edges()) break;
@@ -95,6 +100,21 @@ class Conformer {
   bool is_long(NodeIndex a, NodeIndex b) const {
     return length_squared(stars_.position(b) - stars_.position(a)) >
            kLongEdge * kLongEdge * spacing_m_ * spacing_m_;
+  }
+
+  // The edges for which `holds`, the short ones first.
+  template <typename Holds>
+  std::vector<Edge> edges_where(const Holds& holds) const {
+    std::vector<Edge> edges;
+    for (const Tet& tet : stars_.tets())
+      for (std::size_t i = 0; i < 4; ++i)
+        for (std::size_t j = 0; j < i; ++j)
+          if (holds(tet[i], tet[j]))
+            edges.push_back(
+                {is_long(tet[i], tet[j]), std::min(tet[i], tet[j]), std::max(tet[i], tet[j])});
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    return edges;
   }
 
   // Finds where the labels of b begin on the way from a; none if more labels meet than a node can
@@ -147,6 +167,39 @@ class Conformer {
     return !stars_.is_on_surface(node) || stars_.is_surface_edge(node, towards);
   }
 
+  // Splits edges between nodes of one label in whose middle another is, so that it has a node
+  // there.
+  void split_hidden_edges() {
+    const auto bound = ShapeBound::of_degrees(kHiddenMinDihedral_deg, kHiddenMaxDihedral_deg);
+    for (const Edge& edge : edges_where(
+             [&](NodeIndex a, NodeIndex b) { return labels_[a.value].meets(labels_[b.value]); })) {
+      const Vec3d from = stars_.position(edge.a), way = stars_.position(edge.b) - from;
+      const auto own = *labels_[edge.a.value].begin();
+      const auto at = [&](double share) { return label_at_(from + way * share); };
+      for (const double share : {0.5, 0.25, 0.75}) {
+        const auto hidden = at(share);
+        if (hidden == own) continue;
+        const double begin = where_it_ends(at, hidden, share, 0),
+                     end = where_it_ends(at, hidden, share, 1);
+        const Vec3d middle = from + way * ((begin + end) / 2);
+        if (end - begin < kHiddenShare || !stars_.can_split(edge.a, edge.b, middle, bound)) break;
+        stars_.split(edge.a, edge.b, middle);
+        labels_.emplace_back().add(hidden);
+        ++split_;
+        break;
+      }
+    }
+  }
+  // Returns the end of the label's stretch of an edge, between a share within it and one beyond.
+  template <typename At>
+  static double where_it_ends(const At& at, std::uint16_t label, double inside, double outside) {
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = (inside + outside) / 2;
+      (at(middle) == label ? inside : outside) = middle;
+    }
+    return inside;
+  }
+
   void pull_nodes() {
     const auto bound = ShapeBound::of_degrees(kMovedMinDihedral_deg, kMovedMaxDihedral_deg);
     for (std::uint32_t n = 0; n < stars_.node_count(); ++n) {
@@ -169,15 +222,8 @@ class Conformer {
   // Splits the edges that cross now, the short ones first. Returns whether anything changed.
   bool split_edges() {
     const auto bound = conforming_bound();
-    std::vector<Edge> edges;
-    for (const Tet& tet : stars_.tets())
-      for (std::size_t i = 0; i < 4; ++i)
-        for (std::size_t j = 0; j < i; ++j)
-          if (!labels_[tet[i].value].meets(labels_[tet[j].value]))
-            edges.push_back(
-                {is_long(tet[i], tet[j]), std::min(tet[i], tet[j]), std::max(tet[i], tet[j])});
-    std::sort(edges.begin(), edges.end());
-    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    const auto edges = edges_where(
+        [&](NodeIndex a, NodeIndex b) { return !labels_[a.value].meets(labels_[b.value]); });
     bool has_changed = false;
     for (const Edge& edge : edges)
       if (!labels_[edge.a.value].meets(labels_[edge.b.value]))

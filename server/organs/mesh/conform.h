@@ -2,12 +2,13 @@
 
 // Makes faces of tets lie on the interfaces between labels.
 //
-// Each node has the label at its place. An edge whose ends have different labels crosses an
-// interface. First nodes that have a crossing close to them are moved onto it, as isosurface
-// stuffing does; then the edges that still cross are split there, the short ones first. A node on
-// an interface has the labels of both its sides. Where three labels meet, an edge from a node on an
-// interface of two to a node of the third is split where the third begins, and the new node has all
-// three: lines at which three meet are within a cell of their place, and not on it.
+// Each node has the label at its place. Edges in whose middle another label is, as in a thin
+// vessel, are split there. An edge whose ends have different labels crosses an interface. Nodes
+// that have a crossing close to them are moved onto it, as isosurface stuffing does; then the edges
+// that still cross are split there, the short ones first. A node on an interface has the labels of
+// both its sides. Where three labels meet, an edge from a node on an interface of two to a node of
+// the third is split where the third begins, and the new node has all three: lines at which three
+// meet are within a cell of their place, and not on it.
 //
 // Every change is refused that would leave a tet outside the bounds of dihedral angles of stuffing.
 // Then the interface has a step there, and is counted. Nodes of the outer surface move along it
