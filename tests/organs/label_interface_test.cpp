@@ -203,6 +203,17 @@ TEST(LabelInterface, ALumpTouchesAVessel) {
   expect_fit(result, figures, map);
 }
 
+TEST(LabelInterface, AVesselFourThirdsCellsThickIsWhole) {
+  const auto map = liver_map(0.0045);
+  const auto result = imported(map, 4000);
+  const auto figures = figures_of(result, [](const Vec3d& p) {
+    return std::min(std::abs(to_vessel(p, 0.0045)), std::abs(to_lump(p)));
+  });
+  print(result, figures);
+  expect_fit(result, figures, map);
+  EXPECT_TRUE(result.warnings.empty());
+}
+
 // A vessel of 3 mm in cells of 18 mm cannot be there, and one of 6 mm in cells of 7 mm is there in
 // parts: the report says it, and with the nodes that it asks for all is there.
 TEST(LabelInterface, WhatIsTooThinIsSaid) {
