@@ -103,6 +103,15 @@ Result<Filled> fill_with_interfaces(const LabelSolid& solid, int nodes) {
         filled->mesh, filled->spacing_m, [&](const Vec3d& p) { return field(p); },
         [&](const Vec3d& p) { return solid.distance(p) - grown; });
     if (!conforming) return conforming.error();
+    const double volume = total_volume(conforming->mesh);
+    if (std::abs(volume / solid.volume_m3() - 1) > mesh::kFillVolumeTolerance) {
+      failure =
+          Error{ErrorCode::BadFile,
+                "its interfaces change the volume by more than 1 %: ask for another number of "
+                "nodes (--nodes)"};
+      lattice_nodes = std::max(static_cast<int>(kFewer * lattice_nodes), mesh::kMinFillNodes);
+      continue;
+    }
     const double ratio = static_cast<double>(conforming->mesh.node_count()) / nodes;
     if (std::abs(ratio - 1) < best_error) {
       best_error = std::abs(ratio - 1);
