@@ -51,18 +51,29 @@ bool wants_tls(const std::string& url) {
   return url.starts_with("tls://");
 }
 
-// Each address has the scheme of the first, for one that is left out would be reached without TLS.
+// Each address has the scheme of the first: one that is read otherwise would be reached without
+// TLS.
 Status check_place(const BusPlace& place) {
-  if (place.url.find('@') != std::string::npos)
+  const auto& url = place.url;
+  if (url.find('@') != std::string::npos)
     return Error{ErrorCode::Usage,
-                 "--nats: " + without_passwords(place.url) +
+                 "--nats: " + without_passwords(url) +
                      " names a user, whose password all users of this machine could read: use "
                      "--nats-creds FILE"};
-  for (auto comma = place.url.find(','); comma != std::string::npos;
-       comma = place.url.find(',', comma + 1))
-    if (wants_tls(place.url.substr(comma + 1)) != wants_tls(place.url))
+  for (std::size_t begin = 0; begin <= url.size();) {
+    const auto comma = std::min(url.find(',', begin), url.size());
+    const auto address = url.substr(begin, comma - begin);
+    const auto scheme = address.find("://");
+    const bool is_known = address.starts_with("nats://") || wants_tls(address) ||
+                          (scheme == std::string::npos && address.find(' ') == std::string::npos);
+    if (!is_known)
       return Error{ErrorCode::Usage,
-                   "--nats: '" + place.url + "' has addresses with tls:// and others without"};
+                   "--nats: '" + address + "' is neither nats://HOST:PORT nor tls://HOST:PORT"};
+    if (wants_tls(address) != wants_tls(url))
+      return Error{ErrorCode::Usage,
+                   "--nats: '" + url + "' has addresses with tls:// and others without"};
+    begin = comma + 1;
+  }
   if (!place.ca_file.empty() && !wants_tls(place.url))
     return Error{ErrorCode::Usage, "--nats-ca: needs --nats tls://HOST:PORT"};
   return {};
