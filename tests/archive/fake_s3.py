@@ -4,6 +4,7 @@
 import hashlib
 import hmac
 import http.server
+import re
 import threading
 import urllib.parse
 
@@ -91,7 +92,7 @@ class Storage:
                 if self.command == "GET":
                     parts = storage.uploads[words["uploadId"]][2]
                     entries = "".join(f"<Part><PartNumber>{number}</PartNumber><ETag>&quot;{hashlib.md5(part).hexdigest()}"
-                                      f"&quot;</ETag><Size>{len(part)}</Size></Part>" for number, part in parts.items())
+                                      f"&quot;</ETag><Size>{len(part)}</Size></Part>" for number, part in sorted(parts.items()))
                     return self.answer(200, f"<ListPartsResult>{entries}</ListPartsResult>".encode())
                 if self.command == "DELETE":
                     storage.uploads.pop(words["uploadId"])
@@ -116,11 +117,15 @@ class Storage:
                     storage.uploads[name] = (key, checksum, {})
                     return self.answer(200, f"<R><UploadId>{name}</UploadId></R>".encode())
                 of, checksum, parts = storage.uploads.pop(words["uploadId"])
-                tags = "".join(f"<Part><PartNumber>{number}</PartNumber><ETag>\"{hashlib.md5(part).hexdigest()}\"</ETag></Part>"
-                               for number, part in sorted(parts.items()))
-                if of != key or tags not in body.decode():
+                # An object is of the parts that are named, in order; the others go.
+                named = [(int(number), tag) for number, tag in re.findall(
+                    r'<Part><PartNumber>(\d+)</PartNumber><ETag>"(\w+)"</ETag></Part>', body.decode())]
+                if of != key or not named or named != sorted(named) or any(
+                        number not in parts or hashlib.md5(parts[number]).hexdigest() != tag for number, tag in named):
                     return self.answer(200, b"<Error><Code>InvalidPart</Code><Message>Not these.</Message></Error>")
-                storage.objects[key] = (b"".join(part for _, part in sorted(parts.items())), checksum)
+                if any(len(parts[number]) < 5 << 20 for number, _ in named[:-1]):
+                    return self.answer(400, b"<Error><Code>EntityTooSmall</Code><Message>Too small.</Message></Error>")
+                storage.objects[key] = (b"".join(parts[number] for number, _ in named), checksum)
                 return self.answer(200, b"<CompleteMultipartUploadResult/>")
 
             def log_message(self, *_):

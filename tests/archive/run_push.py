@@ -60,7 +60,7 @@ def main():
     # A large one in three parts, interrupted after two.
     large = f"{OUT}/recordings/large.mcap"
     large_bytes = write_recording(large, 2 * PART + 70_000)
-    storage.fails_after = 2
+    storage.fails_after = 3  # the mark and two parts
     code, said = push(large, "s3://lessons", *at, "--part-mb", "5")
     expect(code != 0 and "SlowDown" in said and len(said.splitlines()) == 1, f"interrupted: {code} {said}")
     expect("large.mcap" not in storage.objects, "half of it is there")
@@ -76,7 +76,7 @@ def main():
     with open(other, "r+b") as file:
         file.seek(PART + 1000)
         file.write(b"another file")
-    storage.fails_after = 2
+    storage.fails_after = 3  # the mark and two parts
     code, said = push(other, "s3://lessons", *at, "--part-mb", "5")
     expect(code != 0 and len(storage.uploads) == 1, f"other interrupted: {code} {said}")
     storage.fails_after = -1
@@ -85,6 +85,28 @@ def main():
     expect(code == 0 and storage.objects.get("other.mcap") == (other_bytes, hashlib.sha256(other_bytes).hexdigest()),
            f"another file's upload: {code} {said}")
     expect(not storage.uploads, "the other file's upload is left")
+
+    # So is one that shares every part that is there, and differs in one that is not; and so is one
+    # that nothing marks as this file's.
+    def take_mark_away():
+        for _, _, parts in storage.uploads.values():
+            del parts[1000]
+
+    for name, tail, take_away in (("shared", 50_000, lambda: None), ("unmarked", 10_000, take_mark_away)):
+        storage.objects.pop("other.mcap")
+        write_recording(other, 2 * PART + tail)
+        with open(other, "r+b") as file:  # the records' lengths are those of the file that follows
+            file.write(other_bytes[:2 * PART])
+        storage.fails_after = 3
+        code, said = push(other, "s3://lessons", *at, "--part-mb", "5")
+        expect(code != 0 and len(storage.uploads) == 1, f"{name} interrupted: {code} {said}")
+        take_away()
+        storage.fails_after = -1
+        other_bytes = write_recording(other, 2 * PART + 10_000)
+        code, said = push(other, "s3://lessons", *at, "--part-mb", "5")
+        expect(code == 0 and storage.objects.get("other.mcap") == (other_bytes, hashlib.sha256(other_bytes).hexdigest()),
+               f"an upload that is {name}: {code} {said}")
+        expect(not storage.uploads, f"the upload that is {name} is left")
     os.remove(other)
 
     # What another program brings while it is sent stays, in one part and in several.

@@ -40,9 +40,10 @@ HallBus::HallBus(asio::io_context& context, HallServer& server, const std::strin
       timer_(context) {}
 
 Result<std::unique_ptr<HallBus>> HallBus::open(asio::io_context& context, HallServer& server,
-                                               const std::string& url, const std::string& key) {
+                                               const hall::BusPlace& place,
+                                               const std::string& key) {
   std::unique_ptr<HallBus> made(new HallBus(context, server, key));
-  auto bus = hall::Bus::connect(url, "trocar-hall " + made->name_, true);
+  auto bus = hall::Bus::connect(place, "trocar-hall " + made->name_, true);
   if (!bus) return bus.error();
   made->bus_ = std::move(*bus);
   if (const auto subscribed = made->subscribe(); !subscribed) return subscribed.error();

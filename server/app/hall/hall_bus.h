@@ -38,7 +38,7 @@ class HallBus {
 
   // Takes `context` and `server`, which outlive it. ErrorCode::Usage for a wrong URL.
   static Result<std::unique_ptr<HallBus>> open(asio::io_context& context, HallServer& server,
-                                               const std::string& url, const std::string& key);
+                                               const hall::BusPlace& place, const std::string& key);
   void stop();
   const std::string& name() const { return name_; }
 

@@ -208,7 +208,7 @@ Status end_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const std::s
 }
 
 Status run_on_bus(const HallOptions& options, const std::string& key) {
-  const auto bus = hall::Bus::connect(options.nats_url, "trocar-hall command", false);
+  const auto bus = hall::Bus::connect(options.nats, "trocar-hall command", false);
   if (!bus) return bus.error();
   const auto halls = halls_of(**bus);
   if (options.command == HallCommand::Start) return start_anywhere(**bus, halls, options, key);
@@ -226,7 +226,7 @@ Status run_hall_command(const HallOptions& options) {
     if (!read) return Error{read.error().code, "--key: " + read.error().message};
     key = std::move(*read);
   }
-  if (!options.nats_url.empty()) return run_on_bus(options, key);
+  if (!options.nats.url.empty()) return run_on_bus(options, key);
   const HallClient client(options.host, options.port, key);
   switch (options.command) {
     case HallCommand::List:

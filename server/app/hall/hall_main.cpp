@@ -70,8 +70,8 @@ Status run_hall(const HallOptions& options) {
   auto server = HallServer::listen(context, **sessions, start->key);
   if (!server) return server.error();
   std::unique_ptr<HallBus> bus;
-  if (!options.nats_url.empty()) {
-    auto opened = HallBus::open(context, **server, options.nats_url, start->key);
+  if (!options.nats.url.empty()) {
+    auto opened = HallBus::open(context, **server, options.nats, start->key);
     if (!opened) return opened.error();
     bus = std::move(*opened);
     log::info("on the bus as {}", bus->name());

@@ -5,6 +5,7 @@
 #ifdef TROCAR_HAS_NATS
 #include <nats/nats.h>
 
+#include "common/secure/private_files.h"
 #endif
 
 namespace trocar::hall {
@@ -46,6 +47,88 @@ std::string text_of(natsMsg* message) {
                                                  : std::string();
 }
 
+bool wants_tls(const std::string& url) {
+  return url.starts_with("tls://");
+}
+
+// Each address has the scheme of the first: one that is read otherwise would be reached without
+// TLS.
+Status check_place(const BusPlace& place) {
+  const auto& url = place.url;
+  if (url.find('@') != std::string::npos)
+    return Error{ErrorCode::Usage,
+                 "--nats: " + without_passwords(url) +
+                     " names a user, whose password all users of this machine could read: use "
+                     "--nats-creds FILE"};
+  for (std::size_t begin = 0; begin <= url.size();) {
+    const auto comma = std::min(url.find(',', begin), url.size());
+    const auto address = url.substr(begin, comma - begin);
+    const auto scheme = address.find("://");
+    const bool is_known = address.starts_with("nats://") || wants_tls(address) ||
+                          (scheme == std::string::npos && address.find(' ') == std::string::npos);
+    if (!is_known)
+      return Error{ErrorCode::Usage,
+                   "--nats: '" + address + "' is neither nats://HOST:PORT nor tls://HOST:PORT"};
+    if (wants_tls(address) != wants_tls(url))
+      return Error{ErrorCode::Usage,
+                   "--nats: '" + url + "' has addresses with tls:// and others without"};
+    begin = comma + 1;
+  }
+  if (!place.ca_file.empty() && !wants_tls(place.url))
+    return Error{ErrorCode::Usage, "--nats-ca: needs --nats tls://HOST:PORT"};
+  return {};
+}
+
+Status use_ca(natsOptions* options, const std::string& file) {
+  const auto text = secure::read_small_file(file);
+  if (!text) return Error{text.error().code, "--nats-ca: " + text.error().message};
+  if (natsOptions_SetCATrustedCertificates(options, text->c_str()) == NATS_OK) return {};
+  return Error{ErrorCode::BadFile, "--nats-ca: " + file + ": holds no certificate in PEM"};
+}
+
+Status use_creds(natsOptions* options, const std::string& file) {
+  auto text = secure::read_private_file(file);
+  if (!text) return Error{text.error().code, "--nats-creds: " + text.error().message};
+  if (text->find("-----BEGIN NATS USER JWT-----") != std::string::npos) {
+    if (natsOptions_SetUserCredentialsFromFiles(options, file.c_str(), nullptr) == NATS_OK)
+      return {};
+  } else {
+    while (text->ends_with('\n') || text->ends_with('\r')) text->pop_back();
+    const auto colon = text->find(':');
+    const bool is_pair = colon != std::string::npos && colon > 0 &&
+                         std::ranges::all_of(*text, [](char c) { return c > ' ' && c <= '~'; });
+    if (is_pair && natsOptions_SetUserInfo(options, text->substr(0, colon).c_str(),
+                                           text->substr(colon + 1).c_str()) == NATS_OK)
+      return {};
+  }
+  return Error{ErrorCode::BadFile, "--nats-creds: " + file +
+                                       ": holds neither one line USER:PASSWORD without spaces nor "
+                                       "credentials of NATS"};
+}
+
+// Returns the error of a NATS that is there, and that waiting does not change.
+Status check_refusal(natsStatus status, const BusPlace& place) {
+  const auto refused = [&](const std::string& why) {
+    return Error{ErrorCode::Refused, "--nats: " + place.url + " " + why};
+  };
+  switch (status) {
+    case NATS_SSL_ERROR: {
+      const char* detail = nats_GetLastError(nullptr);
+      return refused(
+          std::string("has no certificate that ") +
+          (place.ca_file.empty() ? "this machine trusts" : place.ca_file + " vouches for") +
+          " under that name (" + (detail != nullptr ? detail : "TLS") + ")");
+    }
+    case NATS_SECURE_CONNECTION_WANTED:
+      return refused("speaks no TLS: nothing was sent");
+    case NATS_CONNECTION_AUTH_FAILED:
+      return refused(place.creds_file.empty() ? "wants a user: use --nats-creds FILE"
+                                              : "does not let in who is in " + place.creds_file);
+    default:
+      return {};
+  }
+}
+
 struct OptionsDeleter {
   void operator()(natsOptions* options) const { natsOptions_Destroy(options); }
 };
@@ -76,10 +159,15 @@ Bus::~Bus() {
   for (auto* subscription : parts_->subscriptions) natsSubscription_Destroy(subscription);
   natsConnection_Destroy(parts_->connection);
   nats_CloseAndWait(kEndTimeoutMs);
+  // At the end of the process a closed library frees what OpenSSL frees once more (libnats 3.4.1,
+  // with TLS). An open one leaves it alone.
+  nats_Open(-1);
 }
 
-Result<std::unique_ptr<Bus>> Bus::connect(const std::string& url, const std::string& name,
+Result<std::unique_ptr<Bus>> Bus::connect(const BusPlace& place, const std::string& name,
                                           bool is_patient) {
+  if (const auto sound = check_place(place); !sound) return sound.error();
+  const auto& url = place.url;
   natsOptions* made = nullptr;
   auto status = natsOptions_Create(&made);
   const std::unique_ptr<natsOptions, OptionsDeleter> options(made);
@@ -88,15 +176,23 @@ Result<std::unique_ptr<Bus>> Bus::connect(const std::string& url, const std::str
   if (status == NATS_OK) status = natsOptions_SetTimeout(made, kConnectTimeoutMs);
   if (status == NATS_OK) status = natsOptions_SetMaxReconnect(made, -1);
   if (status == NATS_OK) status = natsOptions_SetReconnectWait(made, kReconnectWaitMs);
-  if (status == NATS_OK && is_patient)
-    status = natsOptions_SetRetryOnFailedConnect(made, true, note_connection, nullptr);
+  if (status == NATS_OK && wants_tls(url)) status = natsOptions_SetSecure(made, true);
   if (status != NATS_OK)
-    return Error{ErrorCode::Usage, "--nats: '" + without_passwords(url) +
-                                       "' is not a URL of NATS, such as nats://127.0.0.1:4222"};
+    return Error{ErrorCode::Usage,
+                 "--nats: '" + url + "' is not a URL of NATS, such as nats://127.0.0.1:4222"};
+  if (!place.ca_file.empty())
+    if (const auto used = use_ca(made, place.ca_file); !used) return used.error();
+  if (!place.creds_file.empty())
+    if (const auto used = use_creds(made, place.creds_file); !used) return used.error();
   auto parts = std::make_unique<Parts>();
   status = natsConnection_Connect(&parts->connection, made);
-  const bool is_there = status == NATS_OK || (is_patient && status == NATS_NOT_YET_CONNECTED);
-  if (!is_there) return error_of(status, "no NATS answers at " + without_passwords(url));
+  if (const auto let_in = check_refusal(status, place); !let_in) return let_in.error();
+  if (status != NATS_OK && is_patient) {
+    status = natsOptions_SetRetryOnFailedConnect(made, true, note_connection, nullptr);
+    if (status == NATS_OK) status = natsConnection_Connect(&parts->connection, made);
+    if (status == NATS_NOT_YET_CONNECTED) status = NATS_OK;
+  }
+  if (status != NATS_OK) return error_of(status, "no NATS answers at " + url);
   return std::unique_ptr<Bus>(new Bus(std::move(parts)));
 }
 
@@ -158,7 +254,7 @@ struct Bus::Parts {};
 Bus::Bus(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Bus::~Bus() = default;
 
-Result<std::unique_ptr<Bus>> Bus::connect(const std::string&, const std::string&, bool) {
+Result<std::unique_ptr<Bus>> Bus::connect(const BusPlace&, const std::string&, bool) {
   return Error{ErrorCode::Usage,
                "--nats: these programs were built without NATS: install libnats-dev, and build "
                "them again"};

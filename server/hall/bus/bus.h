@@ -21,16 +21,25 @@ namespace trocar::hall {
 // Returns `url` without what stands before an @ in each of its addresses: "nats://***@HOST:PORT".
 std::string without_passwords(const std::string& url);
 
+// Names a NATS, and how one gets in.
+struct BusPlace {
+  std::string url;      // nats://HOST:PORT or tls://HOST:PORT, or several with commas, no user
+  std::string ca_file;  // PEM of who vouches for its certificate; empty: whom this machine trusts
+  std::string creds_file;  // USER:PASSWORD, or NATS's own credentials (JWT); empty: none
+};
+
 class Bus {
  public:
   static constexpr std::size_t kMostTextBytes = 256 * 1024;
   // `answer_to`: a subject; empty: nobody waits.
   using Take = std::function<void(const std::string& text, const std::string& answer_to)>;
 
-  // `url`: nats://[USER:PASSWORD@]HOST:PORT, or several with commas. ErrorCode::ResourceMissing
-  // where nobody answers, unless it is patient; ErrorCode::Usage for a wrong URL, or without NATS
-  // in this build. One at a time in a process.
-  static Result<std::unique_ptr<Bus>> connect(const std::string& url, const std::string& name,
+  // ErrorCode::ResourceMissing where nobody answers, unless it is patient; ErrorCode::Refused for a
+  // wrong certificate or wrong credentials, also if it is patient; ErrorCode::BadFile for a file
+  // that cannot be used, or credentials that others may read; ErrorCode::Usage for a wrong URL, one
+  // with a password, a certificate without tls://, or without NATS in this build. One at a time in
+  // a process.
+  static Result<std::unique_ptr<Bus>> connect(const BusPlace& place, const std::string& name,
                                               bool is_patient);
   ~Bus();
 

@@ -19,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// A part that no object gets: it says of which file an upload is. It comes after all others.
+constexpr std::size_t kMarkPart = kMostParts + 1;
 constexpr long kOk = 200, kNoContent = 204, kNotFound = 404, kThereAlready = 412;
 // The storage takes nothing in place of what another program has brought meanwhile.
 const Fields::value_type kOnlyNew{"if-none-match", "*"};
@@ -39,6 +41,12 @@ class Hash {
  private:
   std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context_;
 };
+
+std::string md5_of(BytesView bytes) {
+  Hash md5(EVP_md5());
+  md5.add(bytes);
+  return md5.hex();
+}
 
 // A file as parts of one size, the last of which is shorter.
 class PartedFile {
@@ -76,11 +84,6 @@ class PartedFile {
         size_(size),
         part_bytes_(std::max(part_bytes, (size + kMostParts - 1) / kMostParts)) {
     md5_.resize(std::max<std::size_t>(1, (size_ + part_bytes_ - 1) / part_bytes_));
-  }
-  static std::string md5_of(BytesView bytes) {
-    Hash md5(EVP_md5());
-    md5.add(bytes);
-    return md5.hex();
   }
   Error changed() const { return {ErrorCode::BadFile, path_ + ": has changed while it was read"}; }
   Status hash() {
@@ -180,21 +183,30 @@ class Push {
       const auto is_ours = list_parts(*upload, there);
       if (!is_ours) return is_ours.error();
       if (!*is_ours) {
-        // It is of another file, and would get the checksum of that.
+        // It is or may be of another file, and would get the checksum of that.
         if (auto dropped = drop_upload(*upload); !dropped) return dropped;
         there.clear();
         upload->clear();
       }
     }
-    if (upload->empty())
+    if (upload->empty()) {
       if (upload = begin_upload(); !upload) return upload.error();
+      const auto& sha256 = file_.sha256();
+      const auto marked = send_part(*upload, kMarkPart, bytes_of(std::string_view(sha256)));
+      if (!marked) return marked.error();
+    }
     std::string parts;
     for (std::size_t part = 0; part < file_.count(); ++part) {
       auto& tag = there[part];
       if (!tag.empty()) {
         ++report_.parts_there;
-      } else if (auto sent = send_part(*upload, part, tag); !sent) {
-        return sent;
+      } else {
+        const auto bytes = file_.read(part);
+        if (!bytes) return bytes.error();
+        auto sent = send_part(*upload, part + 1, *bytes);
+        if (!sent) return sent.error();
+        tag = std::move(*sent);
+        ++report_.parts_sent;
       }
       parts +=
           fmt::format("<Part><PartNumber>{}</PartNumber><ETag>{}</ETag></Part>", part + 1, tag);
@@ -252,43 +264,46 @@ class Push {
     return id;
   }
 
-  // Fills in the tags of the parts that are there. False: there are none, or one is not of this
-  // file.
+  // Fills in the tags of the parts that are there. False: the upload is not marked as one of this
+  // file, or a part is not of it. Files may share parts, so that parts alone do not tell.
   Result<bool> list_parts(const std::string& upload, std::map<std::size_t, std::string>& there) {
     const auto answer = ask({.key = key_, .query = {{"uploadId", upload}}});
     if (!answer) return answer.error();
+    bool is_marked = false;
     std::size_t from = 0;
     for (;;) {
       const auto entry = element_text(answer->body, "Part", from);
-      if (entry.empty()) return !there.empty();
+      if (entry.empty()) return is_marked;
       const auto text = [&entry](const char* name) {
         std::size_t at = 0;
         return element_text(entry, name, at);
       };
       const auto number = text("PartNumber");
+      const auto tag = text("ETag");
+      if (number == std::to_string(kMarkPart)) {
+        is_marked = tag == '"' + md5_of(bytes_of(std::string_view(file_.sha256()))) + '"';
+        continue;
+      }
       std::size_t part = 0;
       while (part < file_.count() && number != std::to_string(part + 1)) ++part;
       if (part == file_.count() || text("Size") != std::to_string(file_.size_of(part)) ||
-          text("ETag") != '"' + file_.md5(part) + '"')
+          tag != '"' + file_.md5(part) + '"')
         return false;
-      there[part] = text("ETag");
+      there[part] = tag;
     }
   }
 
-  Status send_part(const std::string& upload, std::size_t part, std::string& tag) {
-    const auto bytes = file_.read(part);
-    if (!bytes) return bytes.error();
+  // Returns the part's tag.
+  Result<std::string> send_part(const std::string& upload, std::size_t number, BytesView bytes) {
     const Request request{.method = "PUT",
                           .key = key_,
-                          .query = {{"partNumber", std::to_string(part + 1)}, {"uploadId", upload}},
-                          .body = *bytes};
+                          .query = {{"partNumber", std::to_string(number)}, {"uploadId", upload}},
+                          .body = bytes};
     const auto answer = ask(request);
     if (!answer) return answer.error();
     const auto found = answer->headers.find("etag");
     if (found == answer->headers.end()) return client_.refusal(request, *answer);
-    tag = found->second;
-    ++report_.parts_sent;
-    return {};
+    return found->second;
   }
 
   S3Client& client_;

@@ -1,8 +1,10 @@
 #pragma once
 
 // Brings a file to S3-compatible storage, whole or in parts. What was interrupted goes on: parts
-// that are there already, by their length and MD5, are not sent again. At the end the storage is
-// asked for length and SHA-256 of what it has. Nothing there is ever replaced.
+// that are there already, by their length and MD5, are not sent again. Part kMostParts + 1 of an
+// upload holds the SHA-256 of its file and goes into no object: an upload of another file, even of
+// one that shares parts, is never gone on with. At the end the storage is asked for length and SHA-256
+// of what it has. Nothing there is ever replaced.
 
 #include <cstdint>
 #include <functional>
@@ -15,7 +17,7 @@ namespace trocar::archive {
 
 inline constexpr std::uint64_t kLeastPartBytes = 5u << 20;  // S3 takes none smaller but the last
 inline constexpr std::uint64_t kPartBytes = 16u << 20;
-inline constexpr std::uint64_t kMostParts = 1000;  // that one answer lists
+inline constexpr std::uint64_t kMostParts = 999;  // one answer lists 1000, the mark among them
 inline constexpr const char* kChecksumHeader = "x-amz-meta-sha256";
 
 struct PushOptions {
