@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "server/organs/embed/picture_size.h"
+#include "common/wire/picture_size.h"
 #include "server/organs/surface/triangle_tree.h"
 
 namespace trocar::embed {
@@ -78,7 +78,7 @@ Error bad(const EmbedOptions& options, const std::string& what) {
 
 Status check_picture(const EmbedOptions& options) {
   if (options.picture.empty()) return {};
-  const auto size = picture_size(options.picture);
+  const auto size = wire::picture_size(options.picture);
   if (!size) return bad(options, "the picture is neither PNG nor JPEG, or its header is broken");
   const auto [width, height] = *size;
   if (std::min(width, height) > 0 && std::max(width, height) <= wire::kMostFinePictureSide)

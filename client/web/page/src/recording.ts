@@ -2,6 +2,7 @@
 // of which the last ones used are kept.
 
 import { fromBinary, toBinary } from '@bufbuild/protobuf';
+import { BinaryReader, WireType } from '@bufbuild/protobuf/wire';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
 import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema, OverviewSchema, type JournalGap, type Overview } from './gen/proto/journal_pb';
@@ -76,6 +77,7 @@ export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 // Fields of Envelope, by channel.
 const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
 const kEventTopics = ['/participants', '/claims', '/topology/change', '/gap', '/lesson'], kMostEvents = 5000;
+const kFineSurfaceField = 16; // of Organ (proto/organ.proto)
 const kCutPause = 1500; // ticks after which a cut is another one; an overview names one tick a second
 const kShown = ['/surface/delta', '/surface/key', '/topology', '/frame_state', '/drawing', ...kEventTopics];
 const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
@@ -155,6 +157,11 @@ export class Recording {
     const { entry } = fromBinary(LessonRecordSchema, m.data);
     if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, topic: '/point', data: toBinary(PointEventSchema, entry.value) };
   }
+  // The FineSurface of the organ, as a message; null: it has none.
+  async fineSurface(): Promise<Uint8Array | null> {
+    const organ = await this.last('/organ', this.firstTick);
+    return organ && organ.data.length <= kMostChunk ? fieldIn(organ.data, kFineSurfaceField) : null;
+  }
   // The overview, a message at a time; nothing in recordings that have none. It is small parts of the
   // file: an hour takes about a megabyte.
   async *overviews(): AsyncGenerator<Overview> {
@@ -169,6 +176,19 @@ export class Recording {
   async *survey(after: number): AsyncGenerator<Item> {
     for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) yield this.item(m);
   }
+}
+
+// The last field of that number in a message, whose type is a message; null: it has none. Throws if
+// it is no message.
+function fieldIn(message: Uint8Array, field: number): Uint8Array | null {
+  const reader = new BinaryReader(message);
+  let found: Uint8Array | null = null;
+  while (reader.pos < reader.len) {
+    const [number, type] = reader.tag();
+    if (number === field && type === WireType.LengthDelimited) found = reader.bytes();
+    else reader.skip(type, number);
+  }
+  return found;
 }
 
 // Items of one tick. A keyframe says the same as a delta; where there is none, it replaces the surface.
