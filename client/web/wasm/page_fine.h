@@ -46,7 +46,8 @@ class PageFine {
   void update(std::span<const Vec3f> positions, std::span<const PageTint> tints,
               std::span<const float> covers);
 
-  bool is_shown() const { return surface_.has_value(); }
+  // True once an update has filled what follows.
+  bool is_shown() const { return surface_ && lips_.size() == surface_->vertex_count(); }
   const embedding::EmbeddedSurface& surface() const { return *surface_; }
   // Change with the vertices and triangles there are, and with where they are and how they look.
   std::uint64_t geometry_version() const { return geometry_version_; }

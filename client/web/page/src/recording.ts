@@ -84,7 +84,7 @@ const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, w
 type Message = McapTypes.TypedMcapRecords['Message'];
 
 export class Recording {
-  private constructor(private readonly reader: McapIndexedReader, private readonly readable: Bytes, readonly startNs: bigint, readonly firstTick: number, readonly lastTick: number, readonly organ: string, readonly bytes: number) {}
+  private constructor(private readonly reader: McapIndexedReader, private readonly readable: Bytes, readonly startNs: bigint, readonly firstTick: number, readonly lastTick: number, readonly organ: string, readonly bytes: number, private readonly protocolMinor: number) {}
 
   // Throws, with one sentence for people, if it is none.
   static async open(readable: Bytes): Promise<Recording> {
@@ -95,18 +95,19 @@ export class Recording {
     try {
       const bytes = Number(await readable.size());
       const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers: { zstd } });
-      let start = reader.statistics?.messageStartTime ?? 0n, organ = '';
+      let start = reader.statistics?.messageStartTime ?? 0n, organ = '', minor = 0;
       for await (const m of reader.readMetadata({ name: 'trocar.session' })) {
         start = BigInt(m.metadata.get('start_utc_ns') ?? start);
         organ = m.metadata.get('organ_name') ?? '';
+        minor = Number(m.metadata.get('protocol')?.split('.')[1] ?? 0);
       }
-      const recording = new Recording(reader, readable, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes);
+      const recording = new Recording(reader, readable, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes, minor);
       if (!(recording.lastTick >= 0 && recording.lastTick <= kMostTicks)) throw new Error(kDamaged);
       // A picture needs a keyframe: the first one is where the recording begins.
       let first = 0;
       for await (const m of reader.readMessages({ topics: ['/surface/key'] })) { first = recording.item(m).tick; break; }
       if (![...reader.channelsById.values()].some(channel => channel.topic === '/surface/key')) throw new Error(kDamaged);
-      return new Recording(reader, readable, start, first, recording.lastTick, organ, bytes);
+      return new Recording(reader, readable, start, first, recording.lastTick, organ, bytes, minor);
     } catch (error) {
       const text = error instanceof Error ? error.message : '';
       if (/footer|Footer|trailing|not indexed|no index/.test(text)) throw new Error(kCutShort);
@@ -157,8 +158,9 @@ export class Recording {
     const { entry } = fromBinary(LessonRecordSchema, m.data);
     if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, topic: '/point', data: toBinary(PointEventSchema, entry.value) };
   }
-  // The FineSurface of the organ, as a message; null: it has none.
+  // The FineSurface of the organ, as a message; null: it has none. Before protocol 1.21 none has.
   async fineSurface(): Promise<Uint8Array | null> {
+    if (this.protocolMinor < 21) return null;
     const organ = await this.last('/organ', this.firstTick);
     return organ && organ.data.length <= kMostChunk ? fieldIn(organ.data, kFineSurfaceField) : null;
   }
