@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "common/base/json.h"
+#include "server/organs/formats/glb_reader.h"
 #include "server/organs/formats/mesh_file.h"
 #include "server/organs/mesh/stuffing.h"
 #include "server/organs/surface/closed_surface.h"
@@ -92,6 +93,20 @@ TEST(MeshWriter, GlbSaysTrueLengths) {
   EXPECT_EQ(json["buffers"][0]["byteLength"], number(body));
   EXPECT_EQ(json["accessors"][0]["count"], ball.mesh.surface_nodes.size());
   EXPECT_EQ(json["accessors"][2]["count"], 3 * ball.mesh.boundary_triangles.size());
+}
+
+TEST(MeshWriter, GlbIsReadAgain) {
+  const Ball ball;
+  const auto raw = parse_glb(to_glb(ball.written), "a.glb");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  ASSERT_EQ(raw->triangles.size(), ball.mesh.boundary_triangles.size());
+  for (std::size_t t = 0; t < raw->triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f there =
+          to_float(ball.mesh.rest_positions[ball.mesh.boundary_triangles[t][k].value]);
+      EXPECT_EQ(to_float(raw->positions[raw->triangles[t][k].value]), there);
+    }
+  EXPECT_TRUE(raw->corner_texture.empty());
 }
 
 }  // namespace

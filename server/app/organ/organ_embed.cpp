@@ -28,6 +28,8 @@ Status embed_surface(const EmbedCommand& command, organ::Organ& organ) {
     auto picture = formats::read_foreign_file(command.picture);
     if (!picture) return picture.error();
     options.picture = std::move(*picture);
+  } else {
+    options.picture = raw->picture;
   }
   auto fine = embed::embed(*raw, organ.mesh, options);
   if (!fine) return fine.error();

@@ -369,7 +369,7 @@ void add_commands(CLI::App& app, Options& options) {
       ->add_option("FILE", options.import_file,
                    "tetrahedra: Gmsh .msh, VTK .vtk or .vtu, TetGen .ele beside "
                    ".node, MEDIT .mesh, "
-                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk; label maps: .nii, .nii.gz, "
+                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .glb, .vtk; label maps: .nii, .nii.gz, "
                    "a DICOM segmentation, or the folder of a DICOM series")
       ->required();
   import
@@ -400,11 +400,12 @@ void add_commands(CLI::App& app, Options& options) {
   import
       ->add_option("--embed", options.embedded,
                    "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
-                   ".obj or .ply, in the unit and place of FILE; at most 200,000 triangles")
+                   ".obj, .ply or .glb, in the unit and place of FILE; at most 200,000 triangles")
       ->type_name("FINE");
   import
       ->add_option("--embed-picture", options.embedded_picture,
-                   "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB")
+                   "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB "
+                   "[that of a .glb]")
       ->type_name("FILE");
   import->add_option("--out", options.out, "file to write [<file's name>.organ, here]")
       ->type_name("FILE");

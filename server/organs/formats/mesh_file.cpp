@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "server/organs/formats/abaqus_reader.h"
+#include "server/organs/formats/glb_reader.h"
 #include "server/organs/formats/gmsh_reader.h"
 #include "server/organs/formats/medit_reader.h"
 #include "server/organs/formats/obj_reader.h"
@@ -33,8 +34,8 @@ Result<TetsOrSurface> either(Result<T> result) {
 }  // namespace
 
 bool is_mesh_file(const std::filesystem::path& path) {
-  static constexpr std::string_view kEndings[] = {".msh",  ".vtk", ".vtu", ".node", ".ele",
-                                                  ".mesh", ".inp", ".stl", ".obj",  ".ply"};
+  static constexpr std::string_view kEndings[] = {".msh", ".vtk", ".vtu", ".node", ".ele", ".mesh",
+                                                  ".inp", ".stl", ".obj", ".ply",  ".glb"};
   return std::ranges::find(kEndings, lower_ending(path)) != std::end(kEndings);
 }
 
@@ -60,6 +61,7 @@ Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name)
   if (begins("$MeshFormat") || begins("$NOD")) return either(parse_gmsh(text, name));
   if (begins("ply\n") || begins("ply\r") || ending == ".ply") return either(parse_ply(text, name));
   if (begins("MeshVersionFormatted") || ending == ".mesh") return either(parse_medit(text, name));
+  if (begins("glTF") || ending == ".glb") return either(parse_glb(text, name));
   if (begins("<VTKFile") || ending == ".vtu") return either(parse_vtu(text, name));
   if (ending == ".msh") return either(parse_gmsh(text, name));
   if (ending == ".inp") return either(parse_abaqus(text, name));

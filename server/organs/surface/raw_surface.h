@@ -20,6 +20,8 @@ struct RawSurface {
   // Each triangle's corners are here in a picture, u to the right and v upward, 0 to 1; empty: the
   // file does not say it.
   std::vector<std::array<std::array<double, 2>, 3>> corner_texture;
+  // A PNG or JPEG file that the file itself holds for them; empty: it has none.
+  std::string picture;
   // One line with file and line: the file says it wrongly, and corner_texture is empty.
   std::string texture_fault;
 };
