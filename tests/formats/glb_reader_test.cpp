@@ -111,6 +111,8 @@ TEST(GlbReader, AllPrimitivesAreOneSurfaceWithItsPicture) {
   ASSERT_EQ(raw.triangles.size(), 4u);
   EXPECT_EQ(raw.picture, kPicture);
   EXPECT_EQ(raw.texture_fault, "");
+  EXPECT_EQ(raw.unit_m, 1.0);
+  EXPECT_EQ(raw.axes, surface::Axes::LeftHeadFront);
   ASSERT_EQ(raw.corner_texture.size(), 4u);
   // The file counts downward from the upper edge.
   const std::array<double, 2> origin{0, 1}, up{0, 0.75};

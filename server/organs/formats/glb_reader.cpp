@@ -83,6 +83,8 @@ class GlbReader {
     open();
     walk();
     auto surface = weld(corners_);
+    surface.unit_m = 1;
+    surface.axes = surface::Axes::LeftHeadFront;  // y up, z forward (3.4)
     if (corners_.empty()) fail("has no triangles");
     if (picture_) {
       surface.picture = std::string(view(*find(element("images", *picture_), "bufferView")));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <variant>
 
 #include "server/organs/formats/abaqus_reader.h"
 #include "server/organs/formats/glb_reader.h"
@@ -31,6 +32,17 @@ Result<TetsOrSurface> either(Result<T> result) {
   return TetsOrSurface(std::move(*result));
 }
 
+// 3D Slicer writes "SPACE=LPS" into a comment or the header.
+surface::Axes said_axes(std::string_view text) {
+  constexpr std::size_t kBeginning = 1024;
+  const auto begin = text.substr(0, kBeginning);
+  if (begin.find("SPACE=RAS") != std::string_view::npos) return surface::Axes::Ras;
+  if (begin.find("SPACE=LPS") != std::string_view::npos) return surface::Axes::Lps;
+  return surface::Axes::Unsaid;
+}
+
+Result<TetsOrSurface> parse(std::string_view text, const std::string& name);
+
 }  // namespace
 
 bool is_mesh_file(const std::filesystem::path& path) {
@@ -54,6 +66,16 @@ Result<std::string> read_foreign_file(const std::filesystem::path& path) {
 }
 
 Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name) {
+  auto result = parse(text, name);
+  if (!result) return result;
+  auto* surface = std::get_if<surface::RawSurface>(&*result);
+  if (surface != nullptr && surface->axes == surface::Axes::Unsaid) surface->axes = said_axes(text);
+  return result;
+}
+
+namespace {
+
+Result<TetsOrSurface> parse(std::string_view text, const std::string& name) {
   if (text.empty()) return Error{ErrorCode::BadFile, name + ": is empty"};
   const auto begins = [&](std::string_view what) { return text.starts_with(what); };
   const std::string ending = lower_ending(name);
@@ -69,6 +91,8 @@ Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name)
   if (ending == ".obj") return either(parse_obj(text, name));
   return Error{ErrorCode::BadFile, name + ": is of no kind that can be imported: " + kMeshEndings};
 }
+
+}  // namespace
 
 Result<TetsOrSurface> read_mesh_file(const std::filesystem::path& path) {
   const std::string ending = lower_ending(path);
