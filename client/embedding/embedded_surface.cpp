@@ -265,6 +265,7 @@ void EmbeddedSurface::settle(std::uint32_t triangle) {
   find_faces_under(triangle, chart);
   const bool has_area = parting_.look_at(base, chart, faces_under_);
   if (!parting_.rims().is_any || faces_under_.empty()) return;
+  if (next_vertices_.size() >= kMostPartVertices) return;
   if (has_area) parting_.part();
   if (has_area && !parting_.parts().empty()) return add_parts(triangle);
   add_whole(triangle, base);

@@ -37,6 +37,10 @@
 
 namespace trocar::embedding {
 
+// Beyond so many vertices of parts and skirts, fine triangles stay whole: long cuts take thousands,
+// and a server that means harm could make them any number.
+inline constexpr std::size_t kMostPartVertices = 200'000;
+
 struct FineShape {
   std::vector<Vec3f> positions;               // at rest, m
   std::vector<TriangleCorners> triangles;     // outward, valid

@@ -2,25 +2,11 @@
 
 #include <algorithm>
 
+#include "client/embedding/fine_shape.h"
 #include "common/base/log.h"
 
 namespace trocar::render {
-namespace {
-
 static_assert(wire::kMostFinePictureSide == std::size_t{kMostImageSide});
-
-embedding::FineShape shape_of(const wire::FineSurface& fine) {
-  embedding::FineShape shape;
-  for (std::size_t v = 0; v < fine.quanta.size(); ++v)
-    shape.positions.push_back(fine.position_m(v));
-  shape.triangles = fine.triangles;
-  for (const auto& [u, v] : fine.texture)
-    shape.texture.push_back({static_cast<float>(u * wire::kTextureQuantum),
-                             1 - static_cast<float>(v * wire::kTextureQuantum)});
-  return shape;
-}
-
-}  // namespace
 
 FineLayer::FineLayer() {
   glGenVertexArrays(1, &array_);
@@ -50,7 +36,7 @@ void FineLayer::follow(const std::shared_ptr<const wire::FineSurface>& fine,
     source_ = fine;
     surface_.reset();
     picture_.clear();
-    if (fine) surface_.emplace(shape_of(*fine));
+    if (fine) surface_.emplace(embedding::shape_of(*fine));
     if (fine && !fine->picture.empty())
       if (Status loaded = picture_.load(fine->picture); !loaded.ok())
         log::warn("the organ's picture cannot be shown: {}", loaded.error().message);

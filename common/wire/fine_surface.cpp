@@ -22,6 +22,10 @@ std::int32_t add_step(const Field& field, int i, std::int32_t before) {
                                    static_cast<std::uint32_t>(field.Get(i)));
 }
 
+Error wrong_part(const std::string& what) {
+  return {ErrorCode::BadMessage, "FineSurfacePart." + what};
+}
+
 bool is_picture(const std::string& file) {
   return file.starts_with("\x89PNG\r\n\x1a\n") || file.starts_with("\xff\xd8\xff");
 }
@@ -148,29 +152,33 @@ std::vector<proto::FineSurfacePart> parts_of(const FineSurface& surface) {
   return parts;
 }
 
-Result<bool> FineSurfaceAssembler::add(const proto::FineSurfacePart& part) {
-  const auto bad = [](const std::string& what) {
-    return Error{ErrorCode::BadMessage, "FineSurfacePart." + what};
-  };
+Result<bool> FinePartOrder::add(const proto::FineSurfacePart& part) {
   if (part.parts() == 0 || part.parts() > kMaxFineParts)
-    return bad("parts: " + std::to_string(part.parts()) + " must be 1 to 512");
+    return wrong_part("parts: " + std::to_string(part.parts()) + " must be 1 to 512");
   if (part.payload().empty() || part.payload().size() > kFinePartBytes)
-    return bad("payload: must have 1 to 32,768 bytes");
+    return wrong_part("payload: must have 1 to 32,768 bytes");
   if (part.part() == 0) {
-    bytes_.clear();
     next_ = 0;
     parts_ = part.parts();
   }
   if (part.part() != next_ || part.parts() != parts_)
-    return bad("part: " + std::to_string(part.part()) + " of " + std::to_string(part.parts()) +
-               " does not follow");
-  bytes_ += part.payload();
+    return wrong_part("part: " + std::to_string(part.part()) + " of " +
+                      std::to_string(part.parts()) + " does not follow");
   if (++next_ < parts_) return false;
+  next_ = parts_ = 0;
+  return true;
+}
+
+Result<bool> FineSurfaceAssembler::add(const proto::FineSurfacePart& part) {
+  const auto is_last = order_.add(part);
+  if (!is_last.ok()) return is_last;
+  if (part.part() == 0) bytes_.clear();
+  bytes_ += part.payload();
+  if (!*is_last) return false;
   proto::FineSurface message;
   const bool is_parsed = message.ParseFromString(bytes_);
   bytes_ = {};
-  next_ = parts_ = 0;
-  if (!is_parsed) return bad("payload: is malformed");
+  if (!is_parsed) return wrong_part("payload: is malformed");
   auto surface = read(message);
   if (!surface) return surface.error();
   surface_ = std::move(*surface);

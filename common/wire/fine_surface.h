@@ -56,6 +56,17 @@ Result<FineSurface> read(const proto::FineSurface& message);
 // Cuts a surface into messages; none for an empty one.
 std::vector<proto::FineSurfacePart> parts_of(const FineSurface& surface);
 
+// Tells whether parts follow each other, whatever they hold.
+class FinePartOrder {
+ public:
+  // True: it was the last one. Part 0 begins anew. Error: the part is malformed, or does not
+  // follow.
+  Result<bool> add(const proto::FineSurfacePart& part);
+
+ private:
+  std::uint32_t next_ = 0, parts_ = 0;
+};
+
 // Puts parts together. At most 16 MiB of them are kept.
 class FineSurfaceAssembler {
  public:
@@ -64,8 +75,8 @@ class FineSurfaceAssembler {
   FineSurface take();
 
  private:
+  FinePartOrder order_;
   std::string bytes_;
-  std::uint32_t next_ = 0, parts_ = 0;
   FineSurface surface_;
 };
 

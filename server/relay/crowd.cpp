@@ -45,6 +45,10 @@ void Crowd::begin(const proto::Welcome& welcome) {
   welcome_->set_return_seconds(options_.return_seconds);
   welcome_->clear_further_address();
   for (const auto& address : options_.further_addresses) welcome_->add_further_address(address);
+  // Who has a part of the fine surface alone gets it anew, whole.
+  for (const auto& [id, watcher] : watchers_)
+    if (!copy_->has_all_fine_parts() || watcher->fine_parts.next() < copy_->fine_parts().size())
+      watcher->fine_parts.begin();
   copy_ = std::make_unique<bridge::SessionCopy>();
   barrier_frame_.reset();
   is_new_ = true;
@@ -70,6 +74,7 @@ Status Crowd::take(const proto::Envelope& message, const wire::SharedBytes& fram
   }
   switch (*news) {
     case News::Nothing:
+    case News::FinePart:  // give_all() gives it
       break;
     case News::Frame:
       if (message.has_surface_frame())
@@ -134,8 +139,10 @@ void Crowd::give_all() {
         !watcher.has_begun && (watcher.is_carrier || (watcher.is_welcome && watcher.carrier == 0));
     if (waits && !show_all(watcher))
       end_watcher(watcher, {EndReason::TooSlow, "the first messages do not fit"});
-    else if (!waits && watcher.listens())
+    else if (!waits && watcher.listens()) {
       give_frame(watcher, false);
+      give_fine_part(watcher);
+    }
   }
 }
 
@@ -248,6 +255,17 @@ bool Crowd::show_all(Watcher& watcher) {
   for (const auto& message : copy_->all_but_frames())
     if (!connections_.send(watcher.id, message)) return false;
   return give_frame(watcher, true);
+}
+
+void Crowd::give_fine_part(Watcher& watcher) {
+  auto& parts = watcher.fine_parts;
+  if (parts.next() >= copy_->fine_parts().size() || !parts.may_send(newest_frame())) return;
+  // The newest frame may still be there, but no queue.
+  const auto limit =
+      std::max(options_.limits.skip_above_bytes / 4, 2 * encoder_->typical_frame_bytes());
+  if (connections_.outstanding_bytes(watcher.id) > limit) return;
+  if (connections_.send(watcher.id, copy_->fine_parts()[parts.next()]))
+    parts.on_sent(newest_frame());
 }
 
 bool Crowd::give_frame(Watcher& watcher, bool is_required) {

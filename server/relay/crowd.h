@@ -118,6 +118,7 @@ class Crowd final : public net::ConnectionHandler {
 
   // Shows somebody everything up to the newest frame; false: it does not fit.
   bool show_all(Watcher& watcher);
+  void give_fine_part(Watcher& watcher);
   bool give_frame(Watcher& watcher, bool is_required);
   // The newest frame is whole. `state`: its FrameState; null: it has none.
   void publish(const wire::SharedBytes& state);

@@ -191,6 +191,7 @@ std::optional<Crowd::Ending> Crowd::handle_ack(Watcher& watcher, const proto::Fr
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(ack.frame()) + " was not given to you yet"};
   watcher.feed.acknowledge(*encoder_, ack.frame());
+  watcher.fine_parts.on_acknowledged(ack.frame());
   if (watcher.is_welcome) note_answer(ack);
   return std::nullopt;
 }

@@ -4,6 +4,7 @@
 
 #include "server/relay/crowd.h"
 #include "server/session/pacing/allowance.h"
+#include "server/session/pacing/part_pacer.h"
 #include "server/session/replication/frame_feed.h"
 
 namespace trocar::relay {
@@ -26,6 +27,7 @@ struct Crowd::Watcher {
   bool is_welcome = false;
   bool has_begun = false;  // it has been shown everything
   replication::FrameFeed feed;
+  pacing::PartPacer fine_parts;       // of the fine surface
   pacing::Allowance messages, bytes;  // that it may send
 };
 

@@ -331,6 +331,34 @@ TEST(FaceGrid, FindsNoFaceOfAnotherLobe) {
   EXPECT_EQ(found, std::vector<std::uint32_t>{0});
 }
 
+// Small faces that do not join, each of whose edges is a rim, under triangles that cover all of
+// them.
+TEST(EmbeddedSurface, PartsAreBoundedWhateverTheCoarseSurface) {
+  constexpr std::uint32_t kSide = 14, kCopies = 1500;
+  Coarse coarse;
+  for (std::uint32_t i = 0; i < kSide * kSide; ++i) {
+    const Vec3f corner{1e-3f * static_cast<float>(i % kSide), 1e-3f * static_cast<float>(i / kSide),
+                       0};
+    coarse.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    for (const Vec3f& to : {Vec3f{}, Vec3f{0.9e-3f, 0, 0}, Vec3f{0, 0.9e-3f, 0}})
+      coarse.rest.push_back(corner + to);
+  }
+  FineShape shape;
+  for (std::uint32_t i = 0; i < kCopies; ++i) {
+    const float high = 1e-6f * static_cast<float>(i);
+    for (const Vec3f& p : {Vec3f{}, Vec3f{0.0135f, 0, 0}, Vec3f{0, 0.0135f, 0}})
+      shape.positions.push_back({p.x, p.y, high});
+    shape.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  EmbeddedSurface surface(shape);
+  surface.follow(coarse.shape());
+  EXPECT_GT(surface.vertex_count(), kMostPartVertices);
+  // The last one that is parted may pass the limit: 256 faces, of at most 24 points and as many
+  // skirts of four vertices at each of three edges.
+  EXPECT_LT(surface.vertex_count(), shape.positions.size() + kMostPartVertices + 256 * 24 * 13);
+  EXPECT_LT(surface.parted_count(), kCopies);
+}
+
 TEST(EmbeddedSurface, MovesOnlyWhatMoves) {
   EmbeddedSurface surface(fine_liver());
   const Coarse coarse = liver_at_rest();

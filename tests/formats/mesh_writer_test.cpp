@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "common/base/json.h"
+#include "server/organs/formats/glb_reader.h"
 #include "server/organs/formats/mesh_file.h"
 #include "server/organs/mesh/stuffing.h"
 #include "server/organs/surface/closed_surface.h"
@@ -92,6 +93,42 @@ TEST(MeshWriter, GlbSaysTrueLengths) {
   EXPECT_EQ(json["buffers"][0]["byteLength"], number(body));
   EXPECT_EQ(json["accessors"][0]["count"], ball.mesh.surface_nodes.size());
   EXPECT_EQ(json["accessors"][2]["count"], 3 * ball.mesh.boundary_triangles.size());
+}
+
+TEST(MeshWriter, GlbOfAPaintedSurfaceIsReadAgain) {
+  GlbSurface surface{.name = "painted",
+                     .positions = {{0, 0, 0}, {0.1f, 0, 0}, {0, 0.1f, 0}, {0.1f, 0.1f, 0.1f}},
+                     .normals = {},
+                     .texture = {{0, 0}, {1, 0}, {0, 0.25f}, {0.5f, 1}},
+                     .triangles = {{0, 1, 2}, {1, 3, 2}},
+                     .picture = std::string("\x89PNG\r\n\x1a\n", 8) + "odd"};
+  const auto raw = parse_glb(to_glb(surface), "a.glb");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  EXPECT_EQ(raw->picture, surface.picture);
+  ASSERT_EQ(raw->triangles.size(), 2u);
+  ASSERT_EQ(raw->corner_texture.size(), 2u);
+  for (std::size_t t = 0; t < 2; ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = surface.triangles[t][k];
+      EXPECT_EQ(to_float(raw->positions[raw->triangles[t][k].value]), surface.positions[v]);
+      const auto [across, upward] = raw->corner_texture[t][k];
+      EXPECT_EQ(across, double{surface.texture[v][0]});
+      EXPECT_EQ(upward, double{surface.texture[v][1]});
+    }
+}
+
+TEST(MeshWriter, GlbIsReadAgain) {
+  const Ball ball;
+  const auto raw = parse_glb(to_glb(ball.written), "a.glb");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  ASSERT_EQ(raw->triangles.size(), ball.mesh.boundary_triangles.size());
+  for (std::size_t t = 0; t < raw->triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f there =
+          to_float(ball.mesh.rest_positions[ball.mesh.boundary_triangles[t][k].value]);
+      EXPECT_EQ(to_float(raw->positions[raw->triangles[t][k].value]), there);
+    }
+  EXPECT_TRUE(raw->corner_texture.empty());
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <string>
+#include <variant>
 
+#include "server/organs/formats/mesh_file.h"
 #include "server/organs/formats/obj_reader.h"
 #include "server/organs/formats/ply_reader.h"
 #include "server/organs/formats/stl_reader.h"
@@ -27,6 +29,17 @@ void expect_the_solid(Result<surface::RawSurface> raw) {
   ASSERT_TRUE(solid.ok()) << solid.error().message;
   EXPECT_TRUE(solid->warnings.empty());
   EXPECT_NEAR(solid->volume_m3, 1.0 / 6, 1e-15);
+}
+
+TEST(SurfaceReaders, AFileMaySayItsAxes) {
+  const auto axes_of = [](const std::string& text, const std::string& name) {
+    auto read = parse_mesh(text, name);
+    EXPECT_TRUE(read.ok()) << read.error().message;
+    return read.ok() ? std::get<surface::RawSurface>(*read).axes : surface::Axes::Unsaid;
+  };
+  EXPECT_EQ(axes_of(kObj, "a.obj"), surface::Axes::Unsaid);
+  EXPECT_EQ(axes_of("# 3D Slicer output. SPACE=RAS\n" + kObj, "a.obj"), surface::Axes::Ras);
+  EXPECT_EQ(axes_of("# 3D Slicer output. SPACE=LPS\n" + kObj, "a.obj"), surface::Axes::Lps);
 }
 
 template <typename T>

@@ -294,7 +294,8 @@ bool decode_mesh(BytesView bytes) {
   return make_solid(formats::parse_mesh(text_of(bytes), kName), kName);
 }
 constexpr char kGmsh[] = "a.msh", kVtk[] = "a.vtk", kVtu[] = "a.vtu", kMedit[] = "a.mesh",
-               kAbaqus[] = "a.inp", kStl[] = "a.stl", kObj[] = "a.obj", kPly[] = "a.ply";
+               kAbaqus[] = "a.inp", kStl[] = "a.stl", kObj[] = "a.obj", kPly[] = "a.ply",
+               kGlb[] = "a.glb";
 
 bool decode_nifti(BytesView bytes) {
   auto map = label_map::parse_nifti(text_of(bytes), std::nullopt, "a.nii");
@@ -377,6 +378,7 @@ constexpr Decoder kDecoders[] = {
     {"stl", decode_mesh<kStl>},
     {"obj", decode_mesh<kObj>},
     {"ply", decode_mesh<kPly>},
+    {"glb", decode_mesh<kGlb>},
     {"nifti", decode_nifti},
     {"dicom", decode_dicom},
     {"script", decode_script},

@@ -16,15 +16,27 @@ wire::FineSurface strip() {
   return fine;
 }
 
-TEST(FineSurfaceOnTheWay, EachPartComesAfterTheOneBeforeHasArrived) {
-  replication::ReplicatorOptions options;
-  options.fine_surface = replication::encode_fine_surface(strip());
-  const std::size_t parts = options.fine_surface.size();
+class FineSurfaceOnTheWay : public ::testing::Test {
+ protected:
+  static replication::ReplicatorOptions options() {
+    replication::ReplicatorOptions options;
+    options.fine_surface = replication::encode_fine_surface(strip());
+    return options;
+  }
+  static bool acknowledge(RawClient& client, const proto::Envelope& message) {
+    proto::Envelope ack;
+    ack.mutable_frame_ack()->set_frame(message.surface_frame().frame());
+    return client.send(ack);
+  }
+  // Acknowledges each frame until the surface is whole.
+  void expect_whole(RawClient& client);
+
+  const std::size_t parts = options().fine_surface.size();
+  LiveSession session{{}, options()};
+};
+
+void FineSurfaceOnTheWay::expect_whole(RawClient& client) {
   ASSERT_GT(parts, 3u);
-  LiveSession session({}, std::move(options));
-  session.publish(10);
-  RawClient client(session.port());
-  ASSERT_TRUE(client.join("Anna", proto::ROLE_SURGEON));
   wire::FineSurfaceAssembler assembler;
   bool is_whole = false;
   std::size_t since_frame = 0, frames = 0, received = 0;
@@ -41,15 +53,46 @@ TEST(FineSurfaceOnTheWay, EachPartComesAfterTheOneBeforeHasArrived) {
     } else if (message->has_surface_frame()) {
       since_frame = 0;
       ++frames;
-      proto::Envelope ack;
-      ack.mutable_frame_ack()->set_frame(message->surface_frame().frame());
-      ASSERT_TRUE(client.send(ack));
+      ASSERT_TRUE(acknowledge(client, *message));
       session.publish(10);
     }
   }
   ASSERT_TRUE(is_whole);
   EXPECT_EQ(received, parts);
   EXPECT_EQ(assembler.take(), strip());
+}
+
+TEST_F(FineSurfaceOnTheWay, EachPartComesAfterTheOneBeforeHasArrived) {
+  session.publish(10);
+  RawClient client(session.port());
+  ASSERT_TRUE(client.join("Anna", proto::ROLE_SURGEON));
+  expect_whole(client);
+}
+
+TEST_F(FineSurfaceOnTheWay, AConnectionThatCarriesGuestsIsSentItOnce) {
+  session.publish(10);
+  RawClient carrier(session.port());
+  for (std::uint32_t guest : {1u, 2u}) {
+    proto::Envelope hello;
+    auto& message = *hello.mutable_guest_message();
+    message.set_guest(guest);
+    message.set_envelope(
+        make_hello("Guest " + std::to_string(guest), proto::ROLE_OBSERVER).SerializeAsString());
+    ASSERT_TRUE(carrier.send(hello));
+  }
+  const auto first = carrier.receive(proto::Envelope::kSurfaceFrame);
+  ASSERT_TRUE(first && acknowledge(carrier, *first));
+  session.publish(10);
+  expect_whole(carrier);
+  for (int i = 0; i < 3; ++i) {
+    session.publish(10);
+    while (const auto message = carrier.receive()) {
+      ASSERT_FALSE(message->has_fine_surface_part());
+      if (!message->has_surface_frame()) continue;
+      ASSERT_TRUE(acknowledge(carrier, *message));
+      break;
+    }
+  }
 }
 
 }  // namespace

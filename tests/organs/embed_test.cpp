@@ -25,7 +25,11 @@ surface::RawSurface raw_of(const mesh::TetMesh& mesh, const Vec3d& offset_m) {
 }
 
 EmbedOptions options_of(const Vec3d& offset_m) {
-  return {.unit_m = 1e-3, .offset_m = offset_m, .picture = {}, .name = "fine.obj"};
+  return {.unit_m = 1e-3,
+          .axes = surface::Axes::Unsaid,
+          .offset_m = offset_m,
+          .picture = {},
+          .name = "fine.obj"};
 }
 
 std::string png_header(unsigned width, unsigned height) {
@@ -49,6 +53,30 @@ TEST_F(Embed, TheSameSurfaceFits) {
   EXPECT_EQ(fine->surface.triangles.size(), raw.triangles.size());
   EXPECT_TRUE(fine->warnings.empty());
   EXPECT_FALSE(fine->surface.texture.empty());
+}
+
+// A label map's x, y, z here are the patient's left, head and front.
+TEST_F(Embed, ThePatientsAxesAreTurnedAsThoseOfALabelMap) {
+  const auto plain = raw_of(organ_.mesh, offset_);
+  const auto straight = embed(plain, organ_.mesh, options_of(offset_));
+  ASSERT_TRUE(straight.ok());
+  for (const auto axes : {surface::Axes::Ras, surface::Axes::Lps}) {
+    auto raw = plain;
+    const double side = axes == surface::Axes::Ras ? -1 : 1;  // towards the left, and the back
+    for (Vec3d& p : raw.positions) p = {side * p.x, -side * p.z, p.y};
+    auto options = options_of(offset_);
+    options.axes = axes;
+    const auto fine = embed(raw, organ_.mesh, options);
+    ASSERT_TRUE(fine.ok()) << fine.error().message;
+    EXPECT_TRUE(fine->warnings.empty()) << "it is no mirror image";
+    EXPECT_EQ(fine->surface, straight->surface);
+    // An error names the place as the file has it.
+    raw.positions[organ_.mesh.boundary_triangles[0][0].value] = {70, 400, 5};
+    const auto far = embed(raw, organ_.mesh, options);
+    ASSERT_FALSE(far.ok());
+    EXPECT_NE(far.error().message.find("the vertex at 70 400 5 is"), std::string::npos)
+        << far.error().message;
+  }
 }
 
 TEST_F(Embed, OneThatLooksInwardIsTurned) {

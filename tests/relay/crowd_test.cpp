@@ -145,6 +145,43 @@ TEST_F(RelayedSession, who_comes_is_shown_everything_and_the_server_is_asked_not
   EXPECT_EQ(said(Envelope::kFrameAck)->frame_ack().frame(), 2u);
 }
 
+TEST_F(RelayedSession, the_fine_surface_reaches_who_comes_a_part_after_each_frame) {
+  wire::FineSurface fine;
+  for (std::int32_t v = 0; v < 20'000; ++v) fine.quanta.push_back({v * 7919 % 100'003, v, 0});
+  for (std::uint32_t t = 0; t + 2 < 20'000; ++t) fine.triangles.push_back({t, t + 1, t + 2});
+  for (auto& part : wire::parts_of(fine)) {
+    Envelope envelope;
+    envelope.mutable_fine_surface_part()->Swap(&part);
+    EXPECT_TRUE(
+        on_io([&] { return crowd_->take(envelope, wire::encode_envelope(envelope)).ok(); }));
+  }
+  auto ann = watcher("Ann");
+  wire::FineSurfaceAssembler assembler;
+  bool is_whole = false;
+  int since_frame = 0, parts = 0;
+  while (!is_whole && parts < 100) {
+    const auto message = ann->receive();
+    ASSERT_TRUE(message);
+    if (message->has_fine_surface_part()) {
+      ++parts;
+      EXPECT_EQ(++since_frame, 1) << "two parts between two frames";
+      const auto added = assembler.add(message->fine_surface_part());
+      ASSERT_TRUE(added.ok()) << added.error().message;
+      is_whole = *added;
+      publish(5);
+    } else if (message->has_surface_frame()) {
+      since_frame = 0;
+      Envelope ack;
+      ack.mutable_frame_ack()->set_frame(message->surface_frame().frame());
+      ASSERT_TRUE(ann->send(ack));
+      publish(5);
+    }
+  }
+  ASSERT_TRUE(is_whole);
+  EXPECT_GT(parts, 3);
+  EXPECT_EQ(assembler.take(), fine);
+}
+
 TEST_F(RelayedSession, frames_and_cuts_reach_everybody_whole) {
   auto ann = watcher("Ann");
   ASSERT_TRUE(ann->follow());

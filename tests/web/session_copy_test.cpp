@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/wire/blood_codec.h"
+#include "common/wire/fine_surface.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "proto/wire.pb.h"
@@ -174,6 +175,39 @@ TEST(SessionCopy, tells_who_comes_late_of_stage_pace_and_marks) {
   EXPECT_EQ(stages, 1);
   EXPECT_EQ(paces, 1);
   EXPECT_EQ(lists, 1);
+}
+
+TEST(SessionCopy, keeps_the_fine_surface_part_by_part) {
+  wire::FineSurface fine;
+  for (std::int32_t v = 0; v < 9000; ++v) fine.quanta.push_back({v * 7919 % 100'003, v, 0});
+  for (std::uint32_t t = 0; t + 2 < 9000; ++t) fine.triangles.push_back({t, t + 1, t + 2});
+  std::vector<Envelope> messages;
+  for (const auto& part : wire::parts_of(fine))
+    *messages.emplace_back().mutable_fine_surface_part() = part;
+  ASSERT_GE(messages.size(), 2u);
+  const auto is_error = [](SessionCopy& copy, const Envelope& message) {
+    return !copy.take(message, wire::encode_envelope(message)).ok();
+  };
+  SessionCopy copy, other;
+  EXPECT_TRUE(is_error(other, messages[1])) << "it is not the first";
+  wire::FineSurfaceAssembler late;
+  bool is_whole = false;
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    EXPECT_FALSE(copy.has_all_fine_parts());
+    EXPECT_EQ(take(copy, messages[i]), News::FinePart);
+    ASSERT_EQ(copy.fine_parts().size(), i + 1);
+    Envelope kept;
+    const auto body = BytesView(*copy.fine_parts()[i]).subspan(wire::kHeaderBytes);
+    ASSERT_TRUE(wire::decode_envelope(body, kept).ok());
+    const auto added = late.add(kept.fine_surface_part());
+    ASSERT_TRUE(added.ok());
+    is_whole = *added;
+  }
+  ASSERT_TRUE(is_whole);
+  EXPECT_TRUE(copy.has_all_fine_parts());
+  EXPECT_EQ(late.take(), fine);
+  EXPECT_TRUE(is_error(copy, messages[0])) << "it is told once";
+  EXPECT_EQ(copy.fine_parts().size(), messages.size());
 }
 
 TEST(SessionCopy, asks_once_for_a_keyframe_when_it_has_lost_count) {

@@ -150,6 +150,64 @@ TROCAR_EXPORT(rest_at) const void* trocar_rest_at() {
 TROCAR_EXPORT(overlay_at) const void* trocar_overlay_at() {
   return model().overlay().data();
 }
+// Counts the triangles of the outside, which are the first ones.
+TROCAR_EXPORT(outer_triangles) std::size_t trocar_outer_triangles() {
+  return model().surface().outer_triangle_count();
+}
+
+// These are of the fine surface. A FineSurface of a recording's organ, as input.
+TROCAR_EXPORT(receive_fine_surface) void trocar_receive_fine_surface(std::size_t bytes) {
+  model().receive_fine_surface(input_view(bytes));
+}
+TROCAR_EXPORT(fine_is_shown) int trocar_fine_is_shown() {
+  return model().fine().is_shown();
+}
+TROCAR_EXPORT(fine_fault) const char* trocar_fine_fault() {
+  return model().fine().fault().c_str();
+}
+TROCAR_EXPORT(fine_geometry_version) double trocar_fine_geometry_version() {
+  return static_cast<double>(model().fine().geometry_version());
+}
+TROCAR_EXPORT(fine_motion_version) double trocar_fine_motion_version() {
+  return static_cast<double>(model().fine().motion_version());
+}
+TROCAR_EXPORT(fine_vertices) std::size_t trocar_fine_vertices() {
+  return model().fine().surface().vertex_count();
+}
+TROCAR_EXPORT(fine_parted) std::size_t trocar_fine_parted() {
+  return model().fine().surface().parted_count();
+}
+TROCAR_EXPORT(fine_triangles) std::size_t trocar_fine_triangles() {
+  return model().fine().surface().triangles().size();
+}
+TROCAR_EXPORT(fine_triangles_at) const void* trocar_fine_triangles_at() {
+  return model().fine().surface().triangles().data();
+}
+TROCAR_EXPORT(fine_positions_at) const void* trocar_fine_positions_at() {
+  return model().fine().surface().positions().data();
+}
+TROCAR_EXPORT(fine_normals_at) const void* trocar_fine_normals_at() {
+  return model().fine().surface().normals().data();
+}
+TROCAR_EXPORT(fine_lips_at) const void* trocar_fine_lips_at() {
+  return model().fine().lips().data();
+}
+TROCAR_EXPORT(fine_overlay_at) const void* trocar_fine_overlay_at() {
+  return model().fine().overlay().data();
+}
+TROCAR_EXPORT(fine_rest_at) const void* trocar_fine_rest_at() {
+  return model().fine().rest().data();
+}
+TROCAR_EXPORT(fine_texture_at) const void* trocar_fine_texture_at() {
+  return model().fine().texture().data();
+}
+TROCAR_EXPORT(fine_picture_at) const void* trocar_fine_picture_at() {
+  return model().fine().picture().data();
+}
+TROCAR_EXPORT(fine_picture_bytes) std::size_t trocar_fine_picture_bytes() {
+  return model().fine().picture().size();
+}
+
 // Null: the session does not bleed. Else the numbers of PageBlood.
 TROCAR_EXPORT(blood) const void* trocar_blood() {
   return model().blood();

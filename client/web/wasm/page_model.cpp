@@ -14,9 +14,7 @@ constexpr float kRegionStrength = 0.50f, kFirmHoldStrength = 0.95f, kTouchStreng
 constexpr float kLineHalfWidth = 0.0009f;  // m
 constexpr std::size_t kMostOutboxBytes = 64 * 1024;
 
-using Tint = std::array<float, 4>;
-
-Tint tint_of(shape::Colour colour, float strength) {
+PageTint tint_of(shape::Colour colour, float strength) {
   const auto linear = [strength](std::uint8_t value) {
     const float x = static_cast<float>(value) / 255;
     return x * x * strength;
@@ -46,6 +44,7 @@ void PageModel::restart() {
   held_.clear();
   lines_ = {};
   drawing_.clear();
+  fine_.restart();
   replica_.emplace([this](const proto::Envelope& message) {
     const auto frame = wire::encode_envelope(message);
     if (outbox_.size() + frame->size() > kMostOutboxBytes) return false;
@@ -57,6 +56,11 @@ void PageModel::restart() {
 }
 
 bool PageModel::accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes) {
+  // A page without a fine surface shows all that matters: none ends for a wrong one.
+  if (envelope.has_fine_surface_part()) {
+    fine_.take(envelope.fine_surface_part());
+    return true;
+  }
   replica_->on_message(envelope, to_ns(now_ms), bytes);
   if (replica_->fault().ok()) return true;
   error_ = replica_->fault().error().message;
@@ -184,7 +188,7 @@ void PageModel::update_overlay(Overlay overlay) {
   held_history_ = replica_->history_version();
   // While hidden, too: which tissue a grasp took is seen when it takes it.
   held_.update(shown_->positions(), shown_->tools(), shapes);
-  tints_.assign(smooth_.vertex_count(), Tint{});
+  tints_.assign(smooth_.vertex_count(), PageTint{});
   overlay_.assign(smooth_.vertex_count(), {});
   if (overlay == Overlay::None) return;
   const auto& holdings = held_.holdings();
@@ -197,24 +201,17 @@ void PageModel::update_overlay(Overlay overlay) {
     if (overlay == Overlay::Regions && i < regions.size() && regions[i] != 0)
       tints_[i] = tint_of(shape::colour_of_region(regions[i]), kRegionStrength);
   }
-  struct Mixed {
-    Tint t;
-    Mixed operator+(const Mixed& o) const {
-      return {{t[0] + o.t[0], t[1] + o.t[1], t[2] + o.t[2], t[3] + o.t[3]}};
-    }
-    Mixed operator*(float s) const { return {{t[0] * s, t[1] * s, t[2] * s, t[3] * s}}; }
-  };
-  std::vector<Mixed> mixed(tints_.size());
-  for (std::size_t i = 0; i < smooth_.coarse_vertex_count(); ++i) mixed[i].t = tints_[i];
-  smooth_.extend_values(mixed);
-  const auto byte = [](float value) {
-    return static_cast<std::uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255);
-  };
-  for (std::size_t i = 0; i < mixed.size(); ++i) {
-    const Tint& t = mixed[i].t;
-    const float whole = t[3] > 1e-3f ? 1 / t[3] : 0.0f;
-    overlay_[i] = {byte(t[0] * whole), byte(t[1] * whole), byte(t[2] * whole), byte(t[3])};
-  }
+  smooth_.extend_values(tints_);
+  for (std::size_t i = 0; i < tints_.size(); ++i) overlay_[i] = bytes_of(tints_[i]);
+}
+
+void PageModel::update_fine() {
+  const auto& topology = replica_->topology();
+  const std::size_t coarse = smooth_.coarse_vertex_count();
+  fine_.follow({topology.rest_positions, topology.triangles, topology.is_wound},
+               replica_->topology_version());
+  fine_.update(shown_->positions(), std::span(tints_).first(coarse),
+               std::span(covers_).first(coarse));
 }
 
 void PageModel::update_drawing() {
@@ -259,6 +256,7 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
   for (const auto& pointer : replica_->pointers(to_ns(now_ms)))
     pointers_.push_back({static_cast<float>(pointer.participant.value), pointer.position_m});
   update_overlay(overlay);
+  update_fine();
   update_drawing();
   return true;
 }

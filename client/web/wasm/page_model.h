@@ -24,6 +24,7 @@
 #include "client/shape/ribbon.h"
 #include "client/shape/smooth_surface.h"
 #include "client/shape/tool_mesh.h"
+#include "client/web/wasm/page_fine.h"
 #include "common/base/bytes.h"
 
 namespace trocar::wasm {
@@ -67,6 +68,8 @@ class PageModel {
   bool receive(BytesView envelope, double now_ms);
   // Takes a message as a recording stores it, without its Envelope; `field`: its number there.
   bool receive_bare(std::uint32_t field, BytesView message, double now_ms);
+  // Takes a proto::FineSurface of a recording's organ. What it is refused for, fine() says.
+  void receive_fine_surface(BytesView message) { fine_.take_whole(message); }
   const std::string& error() const { return error_; }
   // Messages for the server, each with its length before it.
   const Bytes& outbox() const { return outbox_; }
@@ -84,6 +87,8 @@ class PageModel {
   // Changes with the number and the order of vertices and triangles.
   std::uint64_t geometry_version() const { return geometry_version_; }
   const shape::SmoothSurface& surface() const { return smooth_; }
+  // It takes the place of the outside, where it is shown.
+  const PageFine& fine() const { return fine_; }
   // Returns x, y, z at rest, and shape::rim_of.
   std::span<const std::array<float, 4>> rest() const { return rest_; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
@@ -119,6 +124,7 @@ class PageModel {
   void update_blood();
   void update_tools();
   void update_overlay(Overlay overlay);
+  void update_fine();
   void update_drawing();
 
   std::optional<replica::Replica> replica_;
@@ -130,7 +136,8 @@ class PageModel {
   std::size_t built_budget_ = 0;
   std::vector<std::array<float, 4>> rest_;
   std::vector<float> rim_distances_;
-  std::vector<std::array<float, 4>> tints_;  // colour weighted by the fourth
+  std::vector<PageTint> tints_;
+  PageFine fine_;
   std::vector<std::array<std::uint8_t, 4>> overlay_;
   std::vector<float> covers_;  // by blood, 0 to 1
   std::vector<std::array<std::int8_t, 4>> lips_;

@@ -1,5 +1,8 @@
 #include "server/app/organ/organ_embed.h"
 
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <utility>
 #include <variant>
@@ -7,27 +10,105 @@
 #include "server/app/organ/program_name.h"
 #include "server/organs/embed/embed.h"
 #include "server/organs/formats/mesh_file.h"
+#include "server/organs/mesh/raw_tets.h"
 
 namespace trocar::app {
+namespace {
 
-Status embed_surface(const EmbedCommand& command, organ::Organ& organ) {
+using surface::Axes;
+
+const char* name_of(Axes axes) {
+  return axes == Axes::Ras ? "RAS" : "LPS";
+}
+
+// Reads the names of --embed-frame that are of a patient's axes.
+Axes axes_of(const std::string& frame) {
+  return frame == "ras" ? Axes::Ras : frame == "lps" ? Axes::Lps : Axes::Unsaid;
+}
+
+// Sets axes and offset, and says where from they are; empty: they are those of the organ's file.
+std::string choose_frame(const EmbedCommand& command, const EmbedPlace& place,
+                         const surface::RawSurface& raw, embed::EmbedOptions& options) {
+  if (command.frame == "organ") {
+    options.offset_m = {};
+    return "around the organ's centre, as --embed-frame says";
+  }
+  if (command.frame == "file") return "in its own axes, as --embed-frame says";
+  options.axes = axes_of(command.frame);
+  const bool is_said = options.axes != Axes::Unsaid;
+  // Meshes and surfaces are imported in the axes that they have, and so is what is embedded.
+  if (!is_said && place.axes != Axes::Unsaid)
+    options.axes = raw.axes == Axes::Unsaid ? place.axes : raw.axes;
+  if (options.axes == Axes::Unsaid) return {};
+  if (options.axes == Axes::LeftHeadFront)
+    return "x to the left, y to the head, z to the front, as glTF has them";
+  return fmt::format("turned from {}, as {}", name_of(options.axes),
+                     is_said                    ? "--embed-frame says"
+                     : raw.axes != Axes::Unsaid ? "the file says"
+                                                : "the label map is");
+}
+
+std::string unit_text(double unit_m) {
+  return unit_m == 1      ? "m"
+         : unit_m == 1e-2 ? "cm"
+         : unit_m == 1e-3 ? "mm"
+                          : fmt::format("{} m", unit_m);
+}
+
+}  // namespace
+
+void add_embed_options(CLI::App& app, EmbedCommand& command) {
+  app.add_option("--embed", command.file,
+                 "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
+                 ".obj, .ply or .glb, in the unit and place of FILE; at most 200,000 triangles")
+      ->type_name("FINE");
+  app.add_option("--embed-picture", command.picture,
+                 "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB "
+                 "[that of a .glb]")
+      ->type_name("FILE");
+  app.add_option("--embed-frame", command.frame,
+                 "its axes: file (as they are), ras or lps (a patient's, turned as a label map's), "
+                 "organ (as export writes .glb); auto: what it says, or those of FILE")
+      ->type_name("FRAME")
+      ->check(CLI::IsMember({"auto", "file", "ras", "lps", "organ"}))
+      ->capture_default_str();
+  app.add_option("--embed-unit", command.unit,
+                 "length unit of the fine surface: m, cm or mm [.glb: m, else that of FILE]")
+      ->type_name("UNIT")
+      ->check(CLI::IsMember({"m", "cm", "mm"}));
+}
+
+Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ::Organ& organ) {
   if (command.file.empty()) {
-    if (command.picture.empty()) return {};
-    return Error{ErrorCode::Usage, "--embed-picture: needs --embed, the surface it is painted on"};
+    if (!command.picture.empty())
+      return Error{ErrorCode::Usage,
+                   "--embed-picture: needs --embed, the surface it is painted on"};
+    return {};
   }
   auto file = formats::read_mesh_file(command.file);
   if (!file) return file.error();
   const auto* raw = std::get_if<surface::RawSurface>(&*file);
   if (raw == nullptr)
     return Error{ErrorCode::BadFile, command.file + ": --embed needs a surface, it has tetrahedra"};
-  embed::EmbedOptions options{.unit_m = command.unit_m,
-                              .offset_m = organ.source_offset_m,
-                              .picture = {},
-                              .name = command.file};
+  embed::EmbedOptions options;
+  options.unit_m = raw->unit_m.value_or(place.unit_m);
+  options.offset_m = organ.source_offset_m;
+  options.name = command.file;
+  if (!command.unit.empty()) {
+    const auto unit = mesh::parse_unit(command.unit);
+    if (!unit) return unit.error();
+    options.unit_m = mesh::metres_of(*unit);
+  }
+  const auto frame = choose_frame(command, place, *raw, options);
+  if (!frame.empty() || options.unit_m != place.unit_m)
+    std::fprintf(stderr, "%s: %s: read in %s%s%s\n", kProgram, command.file.c_str(),
+                 unit_text(options.unit_m).c_str(), frame.empty() ? "" : ", ", frame.c_str());
   if (!command.picture.empty()) {
     auto picture = formats::read_foreign_file(command.picture);
     if (!picture) return picture.error();
     options.picture = std::move(*picture);
+  } else {
+    options.picture = raw->picture;
   }
   auto fine = embed::embed(*raw, organ.mesh, options);
   if (!fine) return fine.error();

@@ -1,21 +1,38 @@
 #pragma once
 
-// The options --embed and --embed-picture of trocar-organ: a fine surface for an organ.
+// The options --embed, --embed-picture, --embed-frame and --embed-unit of trocar-organ: a fine
+// surface for an organ.
 
+#include <optional>
 #include <string>
 
 #include "common/base/result.h"
 #include "server/organs/organ/organ.h"
+#include "server/organs/surface/raw_surface.h"
+
+namespace CLI {
+class App;
+}
 
 namespace trocar::app {
 
 struct EmbedCommand {
   std::string file, picture;  // empty: none
-  double unit_m = 1;          // of the surface's numbers
+  // "auto", "file", "ras", "lps" or "organ": in which axes, and around which place, the file is.
+  std::string frame = "auto";
+  std::string unit;  // of its lengths; empty: what it says, or else that of the organ's file
 };
 
-// Reads the files and gives the organ its fine surface, and says on stderr how it fits. Nothing is
-// done without a file.
-Status embed_surface(const EmbedCommand& command, organ::Organ& organ);
+// It tells how the organ's file was read: a fine surface follows that.
+struct EmbedPlace {
+  double unit_m = 1;                           // of the file's numbers
+  surface::Axes axes = surface::Axes::Unsaid;  // of a label map: the patient's, else unsaid
+};
+
+void add_embed_options(CLI::App& app, EmbedCommand& command);
+
+// Reads the files and gives the organ its fine surface, and says on stderr how it is placed and how
+// it fits. Nothing is done without a file.
+Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ::Organ& organ);
 
 }  // namespace trocar::app

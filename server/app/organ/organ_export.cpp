@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "common/wire/fine_surface.h"
 #include "server/app/organ/organ_print.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/formats/mesh_writer.h"
@@ -16,13 +17,31 @@ void add_export_command(CLI::App& app, ExportCommand& command) {
   sub->add_option("ORGAN", command.organ, ".organ file, or what inspect takes")->required();
   sub->add_option("--out", command.out,
                   "file to write: .msh (Gmsh 2.2) and .vtu with tets, regions and held nodes; .stl "
-                  "and .glb with the surface")
+                  "and .glb with the surface, .glb with the fine one where there is one")
       ->type_name("FILE")
       ->required();
   sub->add_option("--unit", command.unit, "length unit of the file: m, cm or mm; GLB is in m")
       ->type_name("UNIT")
       ->capture_default_str();
 }
+
+namespace {
+
+formats::GlbSurface fine_surface_of(const organ::Organ& organ) {
+  const wire::FineSurface& fine = organ.fine_surface;
+  formats::GlbSurface surface;
+  surface.name = organ.name;
+  for (std::size_t v = 0; v < fine.quanta.size(); ++v)
+    surface.positions.push_back(fine.position_m(v));
+  for (const auto& [u, v] : fine.texture)
+    surface.texture.push_back({static_cast<float>(u * wire::kTextureQuantum),
+                               static_cast<float>(v * wire::kTextureQuantum)});
+  surface.triangles = fine.triangles;
+  surface.picture = fine.picture;
+  return surface;
+}
+
+}  // namespace
 
 Status run_export(const ExportCommand& command) {
   const auto unit = mesh::parse_unit(command.unit);
@@ -44,10 +63,11 @@ Status run_export(const ExportCommand& command) {
                                .region_names = {organ->name},
                                .held_nodes = organ->fixed_nodes};
   for (const auto& region : organ->regions) written.region_names.push_back(region.name);
-  const auto text = ending == ".msh"   ? formats::to_gmsh(written)
-                    : ending == ".vtu" ? formats::to_vtu(written)
-                    : ending == ".stl" ? formats::to_stl(written)
-                                       : formats::to_glb(written);
+  const auto text = ending == ".msh"              ? formats::to_gmsh(written)
+                    : ending == ".vtu"            ? formats::to_vtu(written)
+                    : ending == ".stl"            ? formats::to_stl(written)
+                    : organ->fine_surface.empty() ? formats::to_glb(written)
+                                                  : formats::to_glb(fine_surface_of(*organ));
   if (auto status = write_text_file(command.out, text); !status) return status;
   std::printf("%s: %s bytes\n", command.out.c_str(), grouped(text.size()).c_str());
   return {};

@@ -28,6 +28,7 @@
 #include "server/organs/catalogue/import_organ.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/dicom/dicom_reader.h"
+#include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/material/material_file.h"
 #include "server/organs/mesh/fill_field.h"
 #include "server/organs/organ/any_material.h"
@@ -105,7 +106,7 @@ struct Options {
   std::string import_name;
   std::optional<int> import_nodes;
   std::string import_labels;
-  std::string embedded, embedded_picture;
+  EmbedCommand embedded;
   bool unit_is_said = false;
   std::string law;
   std::optional<double> young_modulus_pa, poisson_ratio;
@@ -301,11 +302,12 @@ Status run_import(const Options& options) {
   give_regions_its_material(imported->organ);
   if (auto changed = change_organ(options, true, imported->organ); !changed) return changed;
   give_regions_its_material(imported->organ);
-  if (auto embedded = embed_surface({.file = options.embedded,
-                                     .picture = options.embedded_picture,
-                                     .unit_m = imported->unit_m},
-                                    imported->organ);
-      !embedded)
+  EmbedPlace place{.unit_m = imported->unit_m};
+  if (dicom::is_dicom(path))
+    place.axes = surface::Axes::Lps;
+  else if (label_map::is_nifti_file(path))
+    place.axes = surface::Axes::Ras;
+  if (auto embedded = embed_surface(options.embedded, place, imported->organ); !embedded)
     return embedded;
   for (const std::string& note : imported->notes)
     std::fprintf(stderr, "%s: %s: %s\n", kProgram, options.import_file.c_str(), note.c_str());
@@ -366,11 +368,12 @@ void add_commands(CLI::App& app, Options& options) {
   auto* import =
       app.add_subcommand("import", "turn a mesh, a closed surface or a label map into an organ");
   import
-      ->add_option("FILE", options.import_file,
-                   "tetrahedra: Gmsh .msh, VTK .vtk or .vtu, TetGen .ele beside "
-                   ".node, MEDIT .mesh, "
-                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk; label maps: .nii, .nii.gz, "
-                   "a DICOM segmentation, or the folder of a DICOM series")
+      ->add_option(
+          "FILE", options.import_file,
+          "tetrahedra: Gmsh .msh, VTK .vtk or .vtu, TetGen .ele beside "
+          ".node, MEDIT .mesh, "
+          "Abaqus .inp; surfaces: .stl, .obj, .ply, .glb, .vtk; label maps: .nii, .nii.gz, "
+          "a DICOM segmentation, or the folder of a DICOM series")
       ->required();
   import
       ->add_option(
@@ -397,15 +400,7 @@ void add_commands(CLI::App& app, Options& options) {
       ->capture_default_str();
   import->add_option("--name", options.import_name, "name of the organ [the file's]")
       ->type_name("NAME");
-  import
-      ->add_option("--embed", options.embedded,
-                   "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
-                   ".obj or .ply, in the unit and place of FILE; at most 200,000 triangles")
-      ->type_name("FINE");
-  import
-      ->add_option("--embed-picture", options.embedded_picture,
-                   "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB")
-      ->type_name("FILE");
+  add_embed_options(*import, options.embedded);
   import->add_option("--out", options.out, "file to write [<file's name>.organ, here]")
       ->type_name("FILE");
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "server/organs/embed/picture_size.h"
+#include "common/wire/picture_size.h"
 #include "server/organs/surface/triangle_tree.h"
 
 namespace trocar::embed {
@@ -78,13 +78,23 @@ Error bad(const EmbedOptions& options, const std::string& what) {
 
 Status check_picture(const EmbedOptions& options) {
   if (options.picture.empty()) return {};
-  const auto size = picture_size(options.picture);
+  const auto size = wire::picture_size(options.picture);
   if (!size) return bad(options, "the picture is neither PNG nor JPEG, or its header is broken");
   const auto [width, height] = *size;
   if (std::min(width, height) > 0 && std::max(width, height) <= wire::kMostFinePictureSide)
     return {};
   return bad(options, fmt::format("the picture has {} x {} pixels, may have 1 to {} along a side",
                                   width, height, wire::kMostFinePictureSide));
+}
+
+// To the patient's left, head and front.
+Vec3d turned(surface::Axes axes, const Vec3d& p) {
+  if (axes == surface::Axes::Ras) return {-p.x, p.z, p.y};
+  return axes == surface::Axes::Lps ? Vec3d{p.x, p.z, -p.y} : p;
+}
+Vec3d turned_back(surface::Axes axes, const Vec3d& p) {
+  if (axes == surface::Axes::Ras) return {-p.x, p.z, p.y};
+  return axes == surface::Axes::Lps ? Vec3d{p.x, -p.z, p.y} : p;
 }
 
 // Compares with the mesh: how far away, and which way it looks.
@@ -108,7 +118,7 @@ Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine&
     const auto in_file = [&](double c) {
       return std::round(c / options.unit_m * 1e6) / 1e6 + 0.0;  // no minus before zero
     };
-    const Vec3d place = worst + options.offset_m;
+    const Vec3d place = turned_back(options.axes, worst + options.offset_m);
     return bad(options,
                fmt::format("the vertex at {:.5g} {:.5g} {:.5g} is {:.2f} mm from the surface of "
                            "the mesh, may be {:.2f} mm, half of its mean edge: is it the same "
@@ -144,7 +154,8 @@ Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& 
   for (std::size_t i = 0; i < raw.triangles.size(); ++i) {
     std::array<Place, 3> places{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3d p = raw.positions[raw.triangles[i][k].value] * unit - options.offset_m;
+      const Vec3d at = turned(options.axes, raw.positions[raw.triangles[i][k].value]);
+      const Vec3d p = at * unit - options.offset_m;
       if (!is_finite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kFarthest_m)
         return bad(options, fmt::format("triangle {}: a corner is more than 1.9 m from the organ's "
                                         "centre: is it in the same unit?",

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <variant>
 
 #include "server/organs/formats/abaqus_reader.h"
+#include "server/organs/formats/glb_reader.h"
 #include "server/organs/formats/gmsh_reader.h"
 #include "server/organs/formats/medit_reader.h"
 #include "server/organs/formats/obj_reader.h"
@@ -30,11 +32,22 @@ Result<TetsOrSurface> either(Result<T> result) {
   return TetsOrSurface(std::move(*result));
 }
 
+// 3D Slicer writes "SPACE=LPS" into a comment or the header.
+surface::Axes said_axes(std::string_view text) {
+  constexpr std::size_t kBeginning = 1024;
+  const auto begin = text.substr(0, kBeginning);
+  if (begin.find("SPACE=RAS") != std::string_view::npos) return surface::Axes::Ras;
+  if (begin.find("SPACE=LPS") != std::string_view::npos) return surface::Axes::Lps;
+  return surface::Axes::Unsaid;
+}
+
+Result<TetsOrSurface> parse(std::string_view text, const std::string& name);
+
 }  // namespace
 
 bool is_mesh_file(const std::filesystem::path& path) {
-  static constexpr std::string_view kEndings[] = {".msh",  ".vtk", ".vtu", ".node", ".ele",
-                                                  ".mesh", ".inp", ".stl", ".obj",  ".ply"};
+  static constexpr std::string_view kEndings[] = {".msh", ".vtk", ".vtu", ".node", ".ele", ".mesh",
+                                                  ".inp", ".stl", ".obj", ".ply",  ".glb"};
   return std::ranges::find(kEndings, lower_ending(path)) != std::end(kEndings);
 }
 
@@ -53,6 +66,16 @@ Result<std::string> read_foreign_file(const std::filesystem::path& path) {
 }
 
 Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name) {
+  auto result = parse(text, name);
+  if (!result) return result;
+  auto* surface = std::get_if<surface::RawSurface>(&*result);
+  if (surface != nullptr && surface->axes == surface::Axes::Unsaid) surface->axes = said_axes(text);
+  return result;
+}
+
+namespace {
+
+Result<TetsOrSurface> parse(std::string_view text, const std::string& name) {
   if (text.empty()) return Error{ErrorCode::BadFile, name + ": is empty"};
   const auto begins = [&](std::string_view what) { return text.starts_with(what); };
   const std::string ending = lower_ending(name);
@@ -60,6 +83,7 @@ Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name)
   if (begins("$MeshFormat") || begins("$NOD")) return either(parse_gmsh(text, name));
   if (begins("ply\n") || begins("ply\r") || ending == ".ply") return either(parse_ply(text, name));
   if (begins("MeshVersionFormatted") || ending == ".mesh") return either(parse_medit(text, name));
+  if (begins("glTF") || ending == ".glb") return either(parse_glb(text, name));
   if (begins("<VTKFile") || ending == ".vtu") return either(parse_vtu(text, name));
   if (ending == ".msh") return either(parse_gmsh(text, name));
   if (ending == ".inp") return either(parse_abaqus(text, name));
@@ -67,6 +91,8 @@ Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name)
   if (ending == ".obj") return either(parse_obj(text, name));
   return Error{ErrorCode::BadFile, name + ": is of no kind that can be imported: " + kMeshEndings};
 }
+
+}  // namespace
 
 Result<TetsOrSurface> read_mesh_file(const std::filesystem::path& path) {
   const std::string ending = lower_ending(path);

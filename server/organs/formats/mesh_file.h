@@ -4,7 +4,8 @@
 // by the end of its name, a reader is chosen.
 //
 // Tetrahedra: Gmsh (.msh), VTK (.vtk, .vtu), TetGen (.node and .ele), MEDIT (.mesh), Abaqus and
-// CalculiX (.inp). Surfaces: STL, OBJ, PLY, polygonal VTK. A file may have 1 GiB.
+// CalculiX (.inp). Surfaces: STL, OBJ, PLY, glTF in one
+// file (.glb), polygonal VTK. A file may have 1 GiB.
 
 #include <filesystem>
 #include <string>
@@ -17,7 +18,7 @@ namespace trocar::formats {
 
 // The ends of names that are read, with their point and a comma between them.
 inline constexpr const char* kMeshEndings =
-    ".msh, .vtk, .vtu, .node, .ele, .mesh, .inp, .stl, .obj, .ply";
+    ".msh, .vtk, .vtu, .node, .ele, .mesh, .inp, .stl, .obj, .ply, .glb";
 bool is_mesh_file(const std::filesystem::path& path);
 
 Result<TetsOrSurface> read_mesh_file(const std::filesystem::path& path);

@@ -131,48 +131,85 @@ std::string to_stl(const WrittenMesh& written) {
 std::string to_glb(const WrittenMesh& written) {
   const auto& mesh = written.mesh;
   const auto normals = surface_normals(mesh);
+  GlbSurface surface;
+  surface.name = written.name;
   std::vector<std::uint32_t> vertex_of(mesh.node_count(), 0);
-  std::string positions, directions, indices;
+  for (const NodeIndex node : mesh.surface_nodes) {
+    vertex_of[node.value] = static_cast<std::uint32_t>(surface.positions.size());
+    surface.positions.push_back(to_float(mesh.rest_positions[node.value]));
+    surface.normals.push_back(to_float(normals[node.value]));
+  }
+  for (const auto& [a, b, c] : mesh.boundary_triangles)
+    surface.triangles.push_back({vertex_of[a.value], vertex_of[b.value], vertex_of[c.value]});
+  return to_glb(surface);
+}
+
+std::string to_glb(const GlbSurface& surface) {
+  constexpr int kVertices = 34962, kIndices = 34963, kFloat = 5126, kUInt32 = 5125;
+  std::string body;
+  Json views = Json::array(), accessors = Json::array();
+  const auto add_view = [&](const std::string& part, int target) {
+    Json view{{"buffer", 0}, {"byteOffset", body.size()}, {"byteLength", part.size()}};
+    if (target != 0) view["target"] = target;
+    views.push_back(view);
+    body += part;
+    body.resize((body.size() + 3) / 4 * 4, '\0');
+  };
+  const auto add = [&](const std::string& part, int target, int component, std::size_t count,
+                       const char* type) {
+    accessors.push_back({{"bufferView", views.size()},
+                         {"componentType", component},
+                         {"count", count},
+                         {"type", type}});
+    add_view(part, target);
+  };
+  std::string positions, directions, places, indices;
   Vec3f low{1e9f, 1e9f, 1e9f}, high{-1e9f, -1e9f, -1e9f};
-  for (std::size_t v = 0; v < mesh.surface_nodes.size(); ++v) {
-    const auto node = mesh.surface_nodes[v].value;
-    vertex_of[node] = static_cast<std::uint32_t>(v);
-    const Vec3f p = to_float(mesh.rest_positions[node]), n = to_float(normals[node]);
+  for (const Vec3f& p : surface.positions) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
     for (const float c : {p.x, p.y, p.z}) put_bytes(positions, c);
-    for (const float c : {n.x, n.y, n.z}) put_bytes(directions, c);
   }
-  for (const auto& triangle : mesh.boundary_triangles)
-    for (const NodeIndex node : triangle) put_bytes(indices, vertex_of[node.value]);
-  const auto view = [](std::size_t offset, std::size_t bytes, int target) {
-    return Json{{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes}, {"target", target}};
-  };
-  constexpr int kVertices = 34962, kIndices = 34963, kFloat = 5126, kUInt32 = 5125;
-  const auto count = mesh.surface_nodes.size();
+  for (const Vec3f& n : surface.normals)
+    for (const float c : {n.x, n.y, n.z}) put_bytes(directions, c);
+  // The format counts downward from the upper edge.
+  for (const auto& [u, v] : surface.texture)
+    for (const float c : {u, 1 - v}) put_bytes(places, c);
+  for (const auto& triangle : surface.triangles)
+    for (const std::uint32_t vertex : triangle) put_bytes(indices, vertex);
+  const std::size_t count = surface.positions.size();
+  add(positions, kVertices, kFloat, count, "VEC3");
+  accessors[0]["min"] = {low.x, low.y, low.z};
+  accessors[0]["max"] = {high.x, high.y, high.z};
+  Json attributes{{"POSITION", 0}};
+  if (!surface.normals.empty()) {
+    attributes["NORMAL"] = accessors.size();
+    add(directions, kVertices, kFloat, count, "VEC3");
+  }
+  if (!surface.texture.empty()) {
+    attributes["TEXCOORD_0"] = accessors.size();
+    add(places, kVertices, kFloat, count, "VEC2");
+  }
+  Json primitive{{"attributes", attributes}, {"indices", accessors.size()}};
+  add(indices, kIndices, kUInt32, 3 * surface.triangles.size(), "SCALAR");
   Json json{{"asset", {{"version", "2.0"}, {"generator", "trocar-organ"}}},
             {"scene", 0},
             {"scenes", Json::array({{{"nodes", {0}}}})},
-            {"nodes", Json::array({{{"mesh", 0}, {"name", written.name}}})}};
-  json["meshes"] = Json::array(
-      {{{"primitives",
-         Json::array({{{"attributes", {{"POSITION", 0}, {"NORMAL", 1}}}, {"indices", 2}}})}}});
-  json["accessors"] = Json::array(
-      {{{"bufferView", 0},
-        {"componentType", kFloat},
-        {"count", count},
-        {"type", "VEC3"},
-        {"min", {low.x, low.y, low.z}},
-        {"max", {high.x, high.y, high.z}}},
-       {{"bufferView", 1}, {"componentType", kFloat}, {"count", count}, {"type", "VEC3"}},
-       {{"bufferView", 2},
-        {"componentType", kUInt32},
-        {"count", 3 * mesh.boundary_triangles.size()},
-        {"type", "SCALAR"}}});
-  json["bufferViews"] = Json::array({view(0, positions.size(), kVertices),
-                                     view(positions.size(), directions.size(), kVertices),
-                                     view(2 * positions.size(), indices.size(), kIndices)});
-  const std::string body = positions + directions + indices;
+            {"nodes", Json::array({{{"mesh", 0}, {"name", surface.name}}})}};
+  if (!surface.picture.empty()) {
+    primitive["material"] = 0;
+    json["materials"] =
+        Json::array({{{"pbrMetallicRoughness",
+                       {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}}});
+    json["textures"] = Json::array({{{"source", 0}}});
+    const bool is_png = surface.picture.starts_with("\x89PNG");
+    json["images"] = Json::array(
+        {{{"bufferView", views.size()}, {"mimeType", is_png ? "image/png" : "image/jpeg"}}});
+    add_view(surface.picture, 0);
+  }
+  json["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
+  json["accessors"] = accessors;
+  json["bufferViews"] = views;
   json["buffers"] = Json::array({{{"byteLength", body.size()}}});
   std::string text = json.dump(-1, ' ', true, Json::error_handler_t::replace);
   text.resize((text.size() + 3) / 4 * 4, ' ');

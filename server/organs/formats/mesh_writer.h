@@ -9,6 +9,7 @@
 //
 // Source: as for the readers; Khronos: glTF 2.0 specification, 2021.
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -27,9 +28,19 @@ struct WrittenMesh {
   std::vector<NodeIndex> held_nodes;
 };
 
+// A surface in m around the organ's centre, per vertex but for the triangles.
+struct GlbSurface {
+  std::string name;                                     // plain text
+  std::vector<Vec3f> positions, normals;                // normals: or none
+  std::vector<std::array<float, 2>> texture;            // none, or u and v upward
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // outward
+  std::string picture;                                  // none, or a PNG or JPEG file
+};
+
 std::string to_gmsh(const WrittenMesh& written);
 std::string to_vtu(const WrittenMesh& written);
 std::string to_stl(const WrittenMesh& written);
 std::string to_glb(const WrittenMesh& written);
+std::string to_glb(const GlbSurface& surface);
 
 }  // namespace trocar::formats

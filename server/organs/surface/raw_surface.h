@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,14 @@
 #include "server/organs/mesh/tet_mesh.h"
 
 namespace trocar::surface {
+
+// Axes of a patient: towards which sides x, y and z run.
+enum class Axes {
+  Unsaid,
+  Ras,  // right, front (anterior), head (superior)
+  Lps,  // left, back (posterior), head
+  LeftHeadFront
+};
 
 struct RawSurface {
   std::vector<Vec3d> positions;           // in the file's unit
@@ -20,6 +29,10 @@ struct RawSurface {
   // Each triangle's corners are here in a picture, u to the right and v upward, 0 to 1; empty: the
   // file does not say it.
   std::vector<std::array<std::array<double, 2>, 3>> corner_texture;
+  // A PNG or JPEG file that the file itself holds for them; empty: it has none.
+  std::string picture;
+  Axes axes = Axes::Unsaid;      // that the file says of itself
+  std::optional<double> unit_m;  // likewise; nothing: it does not say it
   // One line with file and line: the file says it wrongly, and corner_texture is empty.
   std::string texture_fault;
 };

@@ -395,7 +395,7 @@ std::optional<Replicator::Ending> Replicator::handle_ack(Client& client,
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
   client.feed.acknowledge(encoder_, frame);
-  client.acknowledged = std::max(client.acknowledged, frame);
+  client.fine_parts.on_acknowledged(frame);
   if (client.participant) note_answer(client.participant->slot, ack);
   return std::nullopt;
 }

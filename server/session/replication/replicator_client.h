@@ -3,6 +3,7 @@
 // One connection as the replicator knows it. Only the replicator's own sources include this.
 
 #include "server/session/pacing/allowance.h"
+#include "server/session/pacing/part_pacer.h"
 #include "server/session/replication/frame_feed.h"
 #include "server/session/replication/replicator.h"
 
@@ -34,9 +35,7 @@ struct Replicator::Client {
   bool is_welcome = false;
   FrameFeed feed;
   bool wants_ghost = false;
-  std::size_t fine_parts = 0;  // of the fine surface, sent so far
-  Frame fine_frame = 0;        // the newest one when the last of them was sent
-  Frame acknowledged = 0;      // the newest one
+  pacing::PartPacer fine_parts;  // of the fine surface
   bool has_sent_datagrams = false;
   std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not
   std::uint64_t viewed_ns = 0;   // when it said last where its view is

@@ -16,7 +16,9 @@ constexpr std::size_t kMuchWaitingBytes =
     64 * 1024;  // then what the next one makes stale is left out
 constexpr std::uint64_t kKeyframeGapNs = 250'000'000;
 constexpr std::chrono::seconds kWelcomeDeadline{5};
-// While a frame is held back, so often it is seen whether it may go.
+// Three frames' time without a new one: the session is paused.
+constexpr std::uint64_t kFinePauseNs = 50'000'000;
+// While a frame or a part is held back, so often it is seen whether it may go.
 constexpr std::chrono::milliseconds kPaceInterval{10};
 constexpr int kTries = 2;
 constexpr double kMostMessagesPerSecond = 300;  // a page acknowledges 63 frames a second
@@ -167,6 +169,7 @@ void Seat::hear(News news, const wire::SharedBytes& framed) {
       return;
     case News::LastFrame:
     case News::Frame:
+    case News::FinePart:
     case News::Nothing:
       return wake();
   }
@@ -194,7 +197,24 @@ wire::SharedBytes Seat::next_message() {
     return next;
   }
   if (!has_begun_ || is_last_ || !carrier_->copy().has_frame()) return nullptr;
-  return next_frame();
+  auto next = next_frame();
+  return next ? next : next_fine_part();
+}
+
+bool Seat::awaits_fine_part() const {
+  return has_begun_ && fine_parts_.next() < carrier_->copy().fine_parts().size();
+}
+
+wire::SharedBytes Seat::next_fine_part() {
+  if (!awaits_fine_part()) return nullptr;
+  const auto newest = carrier_->copy().frame();
+  const auto now = monotonic_ns();
+  const bool is_paused = fine_parts_.may_send(newest) && now - fine_ns_ > kFinePauseNs;
+  if (!fine_parts_.has_arrived() && !is_paused) return nullptr;
+  const auto& part = carrier_->copy().fine_parts()[fine_parts_.next()];
+  fine_parts_.on_sent(newest);
+  fine_ns_ = now;
+  return part;
 }
 
 wire::SharedBytes Seat::next_frame() {
@@ -230,8 +250,8 @@ asio::awaitable<void> Seat::write_down() {
       continue;
     }
     if (is_last_ || is_lost_) break;
-    const bool is_held_back =
-        has_begun_ && carrier_->copy().has_frame() && given_ != carrier_->copy().frame();
+    const bool is_held_back = has_begun_ && carrier_->copy().has_frame() &&
+                              (given_ != carrier_->copy().frame() || awaits_fine_part());
     if (is_held_back)
       news_.expires_after(kPaceInterval);
     else
@@ -245,6 +265,7 @@ asio::awaitable<void> Seat::write_down() {
 Seat::Verdict Seat::heed_ack(Frame frame) {
   if (!given_ || frame > *given_) return Verdict::Forbidden;
   pacer_.on_acknowledged(frame, monotonic_ns());
+  fine_parts_.on_acknowledged(frame);
   // The session wants to hear of its last frame from everybody.
   return carrier_->copy().last_frame() == frame ? Verdict::ForSession : Verdict::Done;
 }

@@ -5,7 +5,8 @@
 //
 // To the browser: what he is told, in order, then the newest frame, as a difference from the last
 // that this browser was given. Frames never queue: while the socket is busy, or the browser's
-// acknowledgements say that frames reach it late, they are skipped, for this one alone.
+// acknowledgements say that frames reach it late, they are skipped, for this one alone. Between
+// frames, a part of the fine surface at a time.
 //
 // Bounds: 1 MiB of messages that cannot be skipped, or four whole surfaces; beyond that the
 // connection is cut, and the page comes back to a fresh picture. The browser may send 300 messages
@@ -22,6 +23,7 @@
 
 #include "server/session/pacing/allowance.h"
 #include "server/session/pacing/frame_pacer.h"
+#include "server/session/pacing/part_pacer.h"
 #include "server/web/bridge/bridge.h"
 #include "server/web/bridge/browser_socket.h"
 #include "server/web/bridge/join_request.h"
@@ -61,6 +63,8 @@ class Seat : public std::enable_shared_from_this<Seat> {
   // Null: nothing is to be sent now.
   wire::SharedBytes next_message();
   wire::SharedBytes next_frame();
+  wire::SharedBytes next_fine_part();
+  bool awaits_fine_part() const;
   enum class Verdict { Done, ForSession, Forbidden };
   Verdict heed(BytesView envelope);
   Verdict heed_ack(Frame frame);
@@ -84,6 +88,8 @@ class Seat : public std::enable_shared_from_this<Seat> {
   wire::SharedBytes barrier_;
   std::uint64_t keyframe_ns_ = 0;
   pacing::FramePacer pacer_;
+  pacing::PartPacer fine_parts_;
+  std::uint64_t fine_ns_ = 0;   // when the last of them was sent
   pacing::Allowance messages_;  // that the browser may send
   asio::steady_timer news_, up_ended_;
   std::string why_;

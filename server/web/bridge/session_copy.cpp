@@ -40,6 +40,8 @@ Result<News> SessionCopy::take(const proto::Envelope& message, const wire::Share
     case proto::Envelope::kDrawing:
       take_drawing(message.drawing());
       return News::Event;
+    case proto::Envelope::kFineSurfacePart:
+      return take_fine_part(message.fine_surface_part(), framed);
     case proto::Envelope::kViewEvent:
       view_ = framed;
       return News::Fleeting;
@@ -156,6 +158,18 @@ void SessionCopy::take_drawing(const proto::Drawing& message) {
   else if (drawing_->stroke_size() + message.stroke_size() <= kMostStrokes)
     drawing_->mutable_stroke()->MergeFrom(message.stroke());
   drawing_->set_is_addition(false);
+}
+
+// A session tells it once; so those who have been given some of it have them of this one.
+Result<News> SessionCopy::take_fine_part(const proto::FineSurfacePart& message,
+                                         const wire::SharedBytes& framed) {
+  if (is_fine_whole_ || message.part() != fine_parts_.size())
+    return Error{ErrorCode::BadMessage, "FineSurfacePart.part: does not follow"};
+  const auto added = fine_order_.add(message);
+  if (!added.ok()) return added.error();
+  is_fine_whole_ = *added;
+  fine_parts_.push_back(framed);
+  return News::FinePart;
 }
 
 wire::SharedBytes SessionCopy::wrap(const Kept* base, const Bytes& payload) const {

@@ -16,12 +16,14 @@
 
 #include "common/base/tick.h"
 #include "common/wire/blood_codec.h"
+#include "common/wire/fine_surface.h"
 #include "common/wire/framing.h"
 #include "common/wire/surface_layout.h"
 
 namespace trocar::proto {
 class Drawing;
 class Envelope;
+class FineSurfacePart;
 class SurfaceChange;
 class SurfaceFrame;
 class SurfaceTopology;
@@ -36,7 +38,8 @@ enum class News {
   Event,       // it goes to everybody, in order
   Fleeting,    // likewise, unless too much waits already
   NewSurface,  // likewise, and no frame before it is of use any more
-  LastFrame    // likewise, once the newest frame has been given
+  LastFrame,   // likewise, once the newest frame has been given
+  FinePart     // there is another part of the fine surface to give
 };
 
 class SessionCopy {
@@ -72,6 +75,9 @@ class SessionCopy {
   // marks, stage, view.
   std::vector<wire::SharedBytes> all_but_frames();
   const wire::SharedBytes& topology();
+  // FineSurfacePart, as many as have come; a part at a time beside frames.
+  const std::vector<wire::SharedBytes>& fine_parts() const { return fine_parts_; }
+  bool has_all_fine_parts() const { return is_fine_whole_; }
 
  private:
   static constexpr std::size_t kKeptFrames = 64;
@@ -90,6 +96,8 @@ class SessionCopy {
   bool take_change(const proto::SurfaceChange& message);
   bool take_frame(const proto::SurfaceFrame& message);
   void take_drawing(const proto::Drawing& message);
+  Result<News> take_fine_part(const proto::FineSurfacePart& message,
+                              const wire::SharedBytes& framed);
   const Kept* find(Frame frame) const;
   void lose_count();
   wire::SharedBytes wrap(const Kept* base, const Bytes& payload) const;
@@ -103,6 +111,9 @@ class SessionCopy {
   std::map<Frame, wire::SharedBytes> deltas_;            // by base
   wire::SharedBytes participants_, recording_, pace_, marks_, stage_, view_;
   std::unique_ptr<proto::Drawing> drawing_;
+  wire::FinePartOrder fine_order_;
+  bool is_fine_whole_ = false;
+  std::vector<wire::SharedBytes> fine_parts_;
   std::optional<Frame> last_frame_;
 };
 

@@ -23,6 +23,7 @@ export class Player {
   private isReading = false;
   private hasEnded = false;
   private generation = 0;
+  private hasFine = false; // it was looked for
   private wanted: number | null = null;
   private lastMs = performance.now();
 
@@ -67,6 +68,18 @@ export class Player {
     this.isSeeking = false;
     this.lastMs = performance.now();
     this.onChange();
+    void this.loadFine();
+  }
+  // After the first picture, which it is not needed for. What is wrong with it costs the finer surface alone.
+  private async loadFine(): Promise<void> {
+    if (this.hasFine) return;
+    this.hasFine = true;
+    try {
+      const fine = await this.recording.fineSurface();
+      if (fine) this.replica.receiveFineSurface(fine);
+    } catch {
+      this.replica.receiveFineSurface(new Uint8Array([0xff]));
+    }
   }
 
   // Once per picture.

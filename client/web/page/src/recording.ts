@@ -2,6 +2,7 @@
 // of which the last ones used are kept.
 
 import { fromBinary, toBinary } from '@bufbuild/protobuf';
+import { BinaryReader, WireType } from '@bufbuild/protobuf/wire';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
 import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema, OverviewSchema, type JournalGap, type Overview } from './gen/proto/journal_pb';
@@ -76,13 +77,14 @@ export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 // Fields of Envelope, by channel.
 const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
 const kEventTopics = ['/participants', '/claims', '/topology/change', '/gap', '/lesson'], kMostEvents = 5000;
+const kFineSurfaceField = 16; // of Organ (proto/organ.proto)
 const kCutPause = 1500; // ticks after which a cut is another one; an overview names one tick a second
 const kShown = ['/surface/delta', '/surface/key', '/topology', '/frame_state', '/drawing', ...kEventTopics];
 const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
 type Message = McapTypes.TypedMcapRecords['Message'];
 
 export class Recording {
-  private constructor(private readonly reader: McapIndexedReader, private readonly readable: Bytes, readonly startNs: bigint, readonly firstTick: number, readonly lastTick: number, readonly organ: string, readonly bytes: number) {}
+  private constructor(private readonly reader: McapIndexedReader, private readonly readable: Bytes, readonly startNs: bigint, readonly firstTick: number, readonly lastTick: number, readonly organ: string, readonly bytes: number, private readonly protocolMinor: number) {}
 
   // Throws, with one sentence for people, if it is none.
   static async open(readable: Bytes): Promise<Recording> {
@@ -93,18 +95,19 @@ export class Recording {
     try {
       const bytes = Number(await readable.size());
       const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers: { zstd } });
-      let start = reader.statistics?.messageStartTime ?? 0n, organ = '';
+      let start = reader.statistics?.messageStartTime ?? 0n, organ = '', minor = 0;
       for await (const m of reader.readMetadata({ name: 'trocar.session' })) {
         start = BigInt(m.metadata.get('start_utc_ns') ?? start);
         organ = m.metadata.get('organ_name') ?? '';
+        minor = Number(m.metadata.get('protocol')?.split('.')[1] ?? 0);
       }
-      const recording = new Recording(reader, readable, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes);
+      const recording = new Recording(reader, readable, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes, minor);
       if (!(recording.lastTick >= 0 && recording.lastTick <= kMostTicks)) throw new Error(kDamaged);
       // A picture needs a keyframe: the first one is where the recording begins.
       let first = 0;
       for await (const m of reader.readMessages({ topics: ['/surface/key'] })) { first = recording.item(m).tick; break; }
       if (![...reader.channelsById.values()].some(channel => channel.topic === '/surface/key')) throw new Error(kDamaged);
-      return new Recording(reader, readable, start, first, recording.lastTick, organ, bytes);
+      return new Recording(reader, readable, start, first, recording.lastTick, organ, bytes, minor);
     } catch (error) {
       const text = error instanceof Error ? error.message : '';
       if (/footer|Footer|trailing|not indexed|no index/.test(text)) throw new Error(kCutShort);
@@ -155,6 +158,12 @@ export class Recording {
     const { entry } = fromBinary(LessonRecordSchema, m.data);
     if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, topic: '/point', data: toBinary(PointEventSchema, entry.value) };
   }
+  // The FineSurface of the organ, as a message; null: it has none. Before protocol 1.21 none has.
+  async fineSurface(): Promise<Uint8Array | null> {
+    if (this.protocolMinor < 21) return null;
+    const organ = await this.last('/organ', this.firstTick);
+    return organ && organ.data.length <= kMostChunk ? fieldIn(organ.data, kFineSurfaceField) : null;
+  }
   // The overview, a message at a time; nothing in recordings that have none. It is small parts of the
   // file: an hour takes about a megabyte.
   async *overviews(): AsyncGenerator<Overview> {
@@ -169,6 +178,19 @@ export class Recording {
   async *survey(after: number): AsyncGenerator<Item> {
     for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) yield this.item(m);
   }
+}
+
+// The last field of that number in a message, whose type is a message; null: it has none. Throws if
+// it is no message.
+function fieldIn(message: Uint8Array, field: number): Uint8Array | null {
+  const reader = new BinaryReader(message);
+  let found: Uint8Array | null = null;
+  while (reader.pos < reader.len) {
+    const [number, type] = reader.tag();
+    if (number === field && type === WireType.LengthDelimited) found = reader.bytes();
+    else reader.skip(type, number);
+  }
+  return found;
 }
 
 // Items of one tick. A keyframe says the same as a delta; where there is none, it replaces the surface.

@@ -25,12 +25,30 @@ interface Exports {
   geometry_version(): number;
   vertices(): number;
   triangles(): number;
+  outer_triangles(): number;
   triangles_at(): number;
   positions_at(): number;
   normals_at(): number;
   lips_at(): number;
   rest_at(): number;
   overlay_at(): number;
+  receive_fine_surface(bytes: number): void;
+  fine_is_shown(): number;
+  fine_fault(): number;
+  fine_geometry_version(): number;
+  fine_motion_version(): number;
+  fine_vertices(): number;
+  fine_parted(): number;
+  fine_triangles(): number;
+  fine_triangles_at(): number;
+  fine_positions_at(): number;
+  fine_normals_at(): number;
+  fine_lips_at(): number;
+  fine_overlay_at(): number;
+  fine_rest_at(): number;
+  fine_texture_at(): number;
+  fine_picture_at(): number;
+  fine_picture_bytes(): number;
   blood(): number;
   tools(): number;
   tools_at(): number;
@@ -70,6 +88,20 @@ export interface Tool {
   forceN: Vec3; // of the tissue on the tool
   torqueNm: Vec3;
   penetrationM: number;
+}
+
+// The organ's fine surface, per vertex but for the triangles; `parted`: triangles that a cut has parted.
+export interface Fine {
+  geometryVersion: number; // changes with vertices and triangles
+  motionVersion: number; // changes with what moves
+  parted: number;
+  positions: Float32Array<ArrayBuffer>;
+  normals: Float32Array<ArrayBuffer>;
+  lips: Int8Array<ArrayBuffer>;
+  overlay: Uint8Array<ArrayBuffer>;
+  rest: Float32Array<ArrayBuffer>; // x, y, z, rim
+  texture: Float32Array<ArrayBuffer>; // u, v
+  triangles: Uint32Array<ArrayBuffer>;
 }
 
 export interface Pointer { participant: number; position: Vec3 } // slot; m
@@ -120,6 +152,11 @@ export class Replica {
     this.put(message);
     if (!this.e.receive_bare(field, message.length, nowMs)) throw new Error(this.error());
   }
+  // A FineSurface as a recording's organ has it. If it cannot be drawn, fineFault says why.
+  receiveFineSurface(message: Uint8Array): void {
+    this.put(message);
+    this.e.receive_fine_surface(message.length);
+  }
   // Envelopes for the server.
   takeOutbox(): Uint8Array[] {
     const size = this.e.outbox_size();
@@ -158,6 +195,30 @@ export class Replica {
   rest(): Float32Array { return this.floats(this.e.rest_at(), this.e.vertices() * 4); }
   overlay(): Uint8Array { return new Uint8Array(this.e.memory.buffer, this.e.overlay_at(), this.e.vertices() * 4); }
   triangles(): Uint32Array { return new Uint32Array(this.e.memory.buffer, this.e.triangles_at(), this.e.triangles() * 3); }
+
+  // Counts the triangles of the outside, which are the first ones.
+  get outerTriangles(): number { return this.e.outer_triangles(); }
+
+  // Null: the organ has none, or it is not here yet.
+  fine(): Fine | null {
+    const { e } = this;
+    if (e.fine_is_shown() === 0) return null;
+    const n = e.fine_vertices(), { buffer } = e.memory as { buffer: ArrayBuffer };
+    return {
+      geometryVersion: e.fine_geometry_version(), motionVersion: e.fine_motion_version(), parted: e.fine_parted(),
+      positions: new Float32Array(buffer, e.fine_positions_at(), n * 3), normals: new Float32Array(buffer, e.fine_normals_at(), n * 3),
+      lips: new Int8Array(buffer, e.fine_lips_at(), n * 4), overlay: new Uint8Array(buffer, e.fine_overlay_at(), n * 4),
+      rest: new Float32Array(buffer, e.fine_rest_at(), n * 4), texture: new Float32Array(buffer, e.fine_texture_at(), n * 2),
+      triangles: new Uint32Array(buffer, e.fine_triangles_at(), e.fine_triangles() * 3),
+    };
+  }
+  // Returns the file of its picture, a PNG or JPEG; null: it has none.
+  finePicture(): Uint8Array<ArrayBuffer> | null {
+    const bytes = this.e.fine_picture_bytes();
+    return bytes === 0 ? null : new Uint8Array(this.e.memory.buffer as ArrayBuffer, this.e.fine_picture_at(), bytes).slice();
+  }
+  // One line for people: why the fine surface, or its picture, is not drawn; empty: nothing is wrong.
+  get fineFault(): string { return this.textAt(this.e.fine_fault()); }
 
   tools(): Tool[] {
     const count = this.e.tools(), f = this.floats(this.e.tools_at(), count * kToolFloats), out: Tool[] = [];
@@ -234,8 +295,9 @@ export class Replica {
     if (at === 0) throw new Error(`a message of ${data.length} bytes is larger than any may be`);
     new Uint8Array(this.e.memory.buffer, at, data.length).set(data);
   }
-  private error(): string {
-    const bytes = new Uint8Array(this.e.memory.buffer), at = this.e.error();
+  private error(): string { return this.textAt(this.e.error()); }
+  private textAt(at: number): string {
+    const bytes = new Uint8Array(this.e.memory.buffer);
     return new TextDecoder().decode(bytes.slice(at, bytes.indexOf(0, at)));
   }
   private mesh(at: number): Mesh {

@@ -8,6 +8,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
 import { Field } from './field';
+import { FineLayer } from './fine';
 import { Pane, partsOf, type Part, type ViewCount } from './pane';
 import { Overlay, type Mesh as PlainMesh, type Pointer, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 
@@ -61,6 +62,7 @@ export class Picture {
   private count: ViewCount = 1;
   private active = 0; // of the views: which one mouse and keys move
   private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
+  private readonly fine: FineLayer;
   private readonly field: Field;
   private readonly uniforms: Record<string, IUniform>;
   private readonly tools = new Map<number, DrawnTool>();
@@ -103,12 +105,15 @@ export class Picture {
     };
     this.organ = new Mesh(new BufferGeometry(), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: organVertexSource, uniforms: this.uniforms }));
     this.organ.frustumCulled = false;
+    this.fine = new FineLayer(this.uniforms);
     this.field = new Field(this.uniforms);
-    this.scene.add(this.organ, this.field.backdrop, this.field.scopeEdge);
+    this.scene.add(this.organ, this.fine.mesh, this.field.backdrop, this.field.scopeEdge);
     this.setQuality(this.quality);
   }
 
   get isPlain(): boolean { return this.quality > 0; }
+  // One line for people: why the fine surface, or its picture, is not drawn; empty: nothing is wrong.
+  get fineFault(): string { return this.replica.fineFault || this.fine.fault; }
   get views(): ViewCount { return this.count; }
   get parts(): Part[] { return this.panes.slice(0, this.count).map(pane => pane.part); }
   // How many views there are; the first is always there.
@@ -173,6 +178,7 @@ export class Picture {
     for (const kind of ['pointerdown', 'wheel'] as const) this.canvas.removeEventListener(kind, this.touch, true);
     this.controls.dispose();
     this.field.dispose();
+    this.fine.dispose();
     this.renderer.dispose();
     for (const drawn of [...this.tools.values(), ...this.pointers.values()]) drawn.label.remove();
   }
@@ -213,6 +219,9 @@ export class Picture {
     const target = this.replica.lessonTarget();
     this.placePointers([...this.replica.pointers(), ...(target ? [{ participant: kLessonPoint, position: target }] : [])]);
     this.placeDrawing();
+    this.fine.load(this.replica);
+    // The fine surface takes the place of the outside.
+    this.organ.geometry.setDrawRange(this.fine.isShown ? this.replica.outerTriangles * 3 : 0, Infinity);
     this.renderer.setScissorTest(this.count > 1);
     for (const [view, pane] of shown.entries()) {
       const [left, top, width, height] = pane.part;
@@ -258,8 +267,12 @@ export class Picture {
   private hit(x: number, y: number): Intersection | undefined {
     const ray = new Raycaster(), pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main, [u, v] = pane.inside(x, y);
     ray.setFromCamera(new Vector2(u * 2 - 1, 1 - v * 2), pane.drawn);
-    this.organ.geometry.computeBoundingSphere();
-    return ray.intersectObject(this.organ, false)[0];
+    const { geometry } = this.organ, { start, count } = geometry.drawRange;
+    geometry.computeBoundingSphere();
+    geometry.setDrawRange(0, Infinity); // the mesh's surface is what is felt and drawn on
+    const hit = ray.intersectObject(this.organ, false)[0];
+    geometry.setDrawRange(start, count);
+    return hit;
   }
 
   private setQuality(quality: number): void {
@@ -267,6 +280,7 @@ export class Picture {
     this.head = 'precision highp float;\nprecision highp sampler3D;\n' + (quality === 0 ? '#define FINE 1\n' : '');
     this.organ.material.fragmentShader = this.head + lightingSource + organFragmentSource;
     this.organ.material.needsUpdate = true;
+    this.fine.setHead(this.head);
     this.resize(this.width, this.height);
   }
   // Lowers the quality by itself when pictures take long.

@@ -16,7 +16,7 @@ export interface Hooks {
 
 const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
 // Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
-const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36, 40]);
+const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36, 40, 80]);
 
 export class Session {
   state: State = 'joining';

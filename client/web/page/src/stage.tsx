@@ -80,7 +80,7 @@ interface StageProps {
 export function Stage(props: StageProps): JSX.Element {
   const canvas = useRef<HTMLCanvasElement>(null), labels = useRef<HTMLDivElement>(null), box = useRef<HTMLDivElement>(null);
   const picture = useRef<Picture | null>(null), latest = useRef(props);
-  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [points, setPoints] = useState(false), [sees, setSees] = useState<number | null>(null);
+  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [read, setRead] = useState(''), [points, setPoints] = useState(false), [sees, setSees] = useState<number | null>(null);
   const [views, setViews] = useState<ViewCount>(1), [active, setActive] = useState(0), [parts, setParts] = useState<Part[]>([]);
   const place = useRef<[number, number] | null>(null), hasPointed = useRef(false);
   latest.current = props;
@@ -168,6 +168,7 @@ export function Stage(props: StageProps): JSX.Element {
     picture.current.views = views;
     setParts(picture.current.parts);
   }, [views]);
+  const lack = picture.current?.fineFault ?? '';
   const mayDivide = (box.current?.clientWidth ?? 0) >= kLeastForViews;
 
   const reset = (): void => {
@@ -204,6 +205,7 @@ export function Stage(props: StageProps): JSX.Element {
       <div class="labels" ref={labels} aria-hidden="true" />
       {views > 1 && picture.current && <PaneChoices picture={picture.current} parts={parts} active={active} people={props.people} lenders={lenders} />}
       {fault && <p class="banner fault" role="alert">{fault}</p>}
+      {lack !== '' && lack !== read && <p class="banner" role="status" title="Click to close" onClick={() => setRead(lack)}>{lack}</p>}
       {props.children}
       <div class="view" role="toolbar" aria-label="View">
         <button onClick={reset} title="The view as at the start (C)">Reset view</button>

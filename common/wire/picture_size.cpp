@@ -1,6 +1,6 @@
-#include "server/organs/embed/picture_size.h"
+#include "common/wire/picture_size.h"
 
-namespace trocar::embed {
+namespace trocar::wire {
 namespace {
 
 // The bytes at a place, most significant first; 0 beyond the end.
@@ -38,4 +38,4 @@ std::optional<std::array<std::size_t, 2>> picture_size(std::string_view file) {
   return std::nullopt;
 }
 
-}  // namespace trocar::embed
+}  // namespace trocar::wire

@@ -9,9 +9,9 @@
 #include <optional>
 #include <string_view>
 
-namespace trocar::embed {
+namespace trocar::wire {
 
 // Width and height, pixels, of a PNG or JPEG file's bytes; nothing if it does not say them.
 std::optional<std::array<std::size_t, 2>> picture_size(std::string_view file);
 
-}  // namespace trocar::embed
+}  // namespace trocar::wire
