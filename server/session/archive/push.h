@@ -3,8 +3,8 @@
 // Brings a file to S3-compatible storage, whole or in parts. What was interrupted goes on: parts
 // that are there already, by their length and MD5, are not sent again. Part kMostParts + 1 of an
 // upload holds the SHA-256 of its file and goes into no object: an upload of another file, even of
-// one that shares parts, is never gone on with. At the end the storage is asked for length and SHA-256
-// of what it has. Nothing there is ever replaced.
+// one that shares parts, is never gone on with. At the end the storage is asked for length and
+// SHA-256 of what it has. Nothing there is ever replaced.
 
 #include <cstdint>
 #include <functional>
