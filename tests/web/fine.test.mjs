@@ -13,7 +13,7 @@ prepare(['--organ', organ.path], kRecordings);
 // The surface as the page has it; null: there is none.
 const fine = page => page.evaluate(() => {
   const now = window.trocar.replica.fine();
-  return now && { triangles: now.triangles.length / 3, vertices: now.positions.length / 3, parted: now.parted, geometryVersion: now.geometryVersion };
+  return now && { triangles: now.triangles.length / 3, vertices: now.positions.length / 3, parted: now.parted, geometryVersion: now.geometryVersion, pictureVersion: now.pictureVersion };
 });
 // The places at rest of all triangles (0.1 mm), each from its least corner on, in order: how a surface
 // came to be what it is decides how its vertices are numbered.
@@ -51,8 +51,10 @@ test('the fine surface is drawn with its picture, and cut with the organ; who co
   const blue = await bluePixels(page);
   assert.ok(blue > 0.1, `${blue} of the middle is blue`);
   await picture(page, 'fine-before');
+  const { pictureVersion } = await fine(page);
   const hands = [world.server.hand('Scalpel', 'incise'), world.server.hand('Assistant', 'retract')], begin = await page.evaluate(() => window.trocar.replica.newestTick);
   await until('it is parted', async () => (await fine(page)).parted > 20);
+  assert.equal((await fine(page)).pictureVersion, pictureVersion, 'a cut leaves the picture alone');
   await until('the wound is drawn open', () => page.evaluate(tick => window.trocar.replica.newestTick > tick, begin + 6500));
   await picture(page, 'fine-open');
   for (const hand of hands) hand.kill();

@@ -204,6 +204,9 @@ TROCAR_EXPORT(fine_texture_at) const void* trocar_fine_texture_at() {
 TROCAR_EXPORT(fine_picture_at) const void* trocar_fine_picture_at() {
   return model().fine().picture().data();
 }
+TROCAR_EXPORT(fine_picture_version) double trocar_fine_picture_version() {
+  return static_cast<double>(model().fine().picture_version());
+}
 TROCAR_EXPORT(fine_picture_bytes) std::size_t trocar_fine_picture_bytes() {
   return model().fine().picture().size();
 }

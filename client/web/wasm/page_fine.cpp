@@ -25,10 +25,11 @@ Bytes4 bytes_of(const PageTint& tint) {
 }
 
 void PageFine::restart() {
-  const auto geometry = geometry_version_, motion = motion_version_;
+  const auto geometry = geometry_version_, motion = motion_version_, picture = picture_version_;
   *this = {};
   geometry_version_ = geometry + 1;  // never one that was shown
   motion_version_ = motion + 1;
+  picture_version_ = picture + 1;
 }
 
 void PageFine::refuse(const std::string& why) {

@@ -58,6 +58,8 @@ class PageFine {
   std::span<const Bytes4> overlay() const { return overlay_; }
   // Returns the file's bytes; empty: there is none.
   const std::string& picture() const { return picture_; }
+  // Changes with the picture alone, so that no cut makes anybody unpack it again.
+  std::uint64_t picture_version() const { return picture_version_; }
   const std::string& fault() const { return fault_; }  // one line, or empty
 
  private:
@@ -69,6 +71,7 @@ class PageFine {
   wire::FineSurface source_;  // the picture is not in it
   std::string picture_, fault_;
   std::uint64_t topology_version_ = 0, geometry_version_ = 0, motion_version_ = 0;
+  std::uint64_t picture_version_ = 0;
   std::vector<std::array<float, 4>> rest_;
   std::vector<std::array<float, 2>> texture_;
   std::vector<std::array<std::int8_t, 4>> lips_;

@@ -112,6 +112,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
     }, 100);
     return () => {
       isGone = true;
+      player.close();
       window.clearInterval(timer);
     };
   }, []);

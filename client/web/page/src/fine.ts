@@ -15,7 +15,7 @@ export class FineLayer {
   private readonly hasPicture: IUniform<number> = { value: 0 };
   private geometryVersion = -1;
   private motionVersion = -1;
-  private shown: Uint8Array | null = null; // the picture's file
+  private pictureVersion = -1;
 
   constructor(uniforms: Record<string, IUniform>) {
     this.mesh = new Mesh(new BufferGeometry(), new RawShaderMaterial({
@@ -51,7 +51,6 @@ export class FineLayer {
         g.setAttribute(name, attribute);
       }
       this.geometryVersion = fine.geometryVersion;
-      this.loadPicture(replica.finePicture());
     } else if (fine.motionVersion !== this.motionVersion) {
       for (const [name, array] of [['position', fine.positions], ['normal', fine.normals], ['lip', fine.lips], ['overlay', fine.overlay]] as const) {
         const attribute = this.mesh.geometry.getAttribute(name) as BufferAttribute;
@@ -60,6 +59,10 @@ export class FineLayer {
       }
     }
     this.motionVersion = fine.motionVersion;
+    if (fine.pictureVersion !== this.pictureVersion) {
+      this.pictureVersion = fine.pictureVersion;
+      this.loadPicture(replica.finePicture());
+    }
   }
   dispose(): void {
     this.clear();
@@ -69,9 +72,8 @@ export class FineLayer {
   private clear(): void {
     this.mesh.geometry.dispose();
     this.mesh.geometry = new BufferGeometry();
-    this.geometryVersion = this.motionVersion = -1;
-    this.shown = null;
-    this.showPicture(null);
+    this.geometryVersion = this.motionVersion = this.pictureVersion = -1;
+    this.loadPicture(null);
   }
   private showPicture(texture: Texture | null): void {
     (this.picture.value?.image as ImageBitmap | undefined)?.close();
@@ -81,13 +83,12 @@ export class FineLayer {
   }
   // The browser unpacks it; its size was looked at before (client/web/wasm/page_fine.cpp).
   private loadPicture(file: Uint8Array<ArrayBuffer> | null): void {
-    if (file !== null && this.shown?.length === file.length && this.shown.every((byte, i) => byte === file[i])) return;
-    this.shown = file;
+    const version = this.pictureVersion;
     this.fault = '';
     this.showPicture(null);
     if (file === null) return;
     createImageBitmap(new Blob([file]), { colorSpaceConversion: 'none', premultiplyAlpha: 'none' }).then(bitmap => {
-      if (this.shown !== file) return bitmap.close();
+      if (this.pictureVersion !== version) return bitmap.close();
       const texture = new Texture(bitmap);
       texture.flipY = false;
       texture.colorSpace = NoColorSpace;
@@ -96,7 +97,7 @@ export class FineLayer {
       texture.needsUpdate = true;
       this.showPicture(texture);
     }, () => {
-      if (this.shown === file) this.fault = 'the organ is drawn without its picture: this browser cannot read it';
+      if (this.pictureVersion === version) this.fault = 'the organ is drawn without its picture: this browser cannot read it';
     });
   }
 }

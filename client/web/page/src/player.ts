@@ -24,6 +24,7 @@ export class Player {
   private hasEnded = false;
   private generation = 0;
   private hasFine = false; // it was looked for
+  private isClosed = false;
   private wanted: number | null = null;
   private lastMs = performance.now();
 
@@ -42,6 +43,12 @@ export class Player {
     this.onChange();
   }
 
+  // From now on the replica is somebody else's: what is still being read is not shown.
+  close(): void {
+    this.isClosed = true;
+    this.stream = null;
+  }
+
   // Shows the last frame at or before `tick`. While one seek runs, only the newest wish waits.
   async seek(tick: number): Promise<void> {
     this.wanted = Math.max(this.recording.firstTick, Math.min(this.recording.lastTick, tick));
@@ -57,6 +64,7 @@ export class Player {
       this.hasEnded = false;
       try {
         const items = await this.recording.seek(to);
+        if (this.isClosed) return;
         for (const item of items) this.feed(item);
         this.stream = this.recording.follow(to);
         this.fault = '';
@@ -76,9 +84,9 @@ export class Player {
     this.hasFine = true;
     try {
       const fine = await this.recording.fineSurface();
-      if (fine) this.replica.receiveFineSurface(fine);
+      if (fine && !this.isClosed) this.replica.receiveFineSurface(fine);
     } catch {
-      this.replica.receiveFineSurface(new Uint8Array([0xff]));
+      if (!this.isClosed) this.replica.receiveFineSurface(new Uint8Array([0xff]));
     }
   }
 

@@ -47,6 +47,7 @@ interface Exports {
   fine_overlay_at(): number;
   fine_rest_at(): number;
   fine_texture_at(): number;
+  fine_picture_version(): number;
   fine_picture_at(): number;
   fine_picture_bytes(): number;
   blood(): number;
@@ -94,6 +95,7 @@ export interface Tool {
 export interface Fine {
   geometryVersion: number; // changes with vertices and triangles
   motionVersion: number; // changes with what moves
+  pictureVersion: number; // changes with the picture
   parted: number;
   positions: Float32Array<ArrayBuffer>;
   normals: Float32Array<ArrayBuffer>;
@@ -205,7 +207,7 @@ export class Replica {
     if (e.fine_is_shown() === 0) return null;
     const n = e.fine_vertices(), { buffer } = e.memory as { buffer: ArrayBuffer };
     return {
-      geometryVersion: e.fine_geometry_version(), motionVersion: e.fine_motion_version(), parted: e.fine_parted(),
+      geometryVersion: e.fine_geometry_version(), motionVersion: e.fine_motion_version(), pictureVersion: e.fine_picture_version(), parted: e.fine_parted(),
       positions: new Float32Array(buffer, e.fine_positions_at(), n * 3), normals: new Float32Array(buffer, e.fine_normals_at(), n * 3),
       lips: new Int8Array(buffer, e.fine_lips_at(), n * 4), overlay: new Uint8Array(buffer, e.fine_overlay_at(), n * 4),
       rest: new Float32Array(buffer, e.fine_rest_at(), n * 4), texture: new Float32Array(buffer, e.fine_texture_at(), n * 2),

@@ -98,7 +98,10 @@ export function Beside(props: { other: Other; first: Player; firstEvents: Record
     Object.assign(window, { trocarBeside: { player, replica } });
     readAll(recording, log, course, () => isGone).then(() => redraw(n => n + 1), error => setFault(error instanceof Error ? error.message : String(error)));
     void player.seek(props.first.tick + offset);
-    return () => { isGone = true; };
+    return () => {
+      isGone = true;
+      player.close();
+    };
   }, []);
   return (
     <div class="half">
