@@ -7,7 +7,10 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 #include "common/base/result.h"
 #include "server/app/config/option_origins.h"
@@ -31,5 +34,27 @@ Result<bool> parse_with_config(CLI::App& app, int argc, char** argv, CheckOption
 
 // Returns the file of --config, empty if none was named.
 std::string config_file_of(const CLI::App& app);
+
+// Does all of this for a program's CommandLine: it has app(), options() with `origins` and
+// `config_file`, check() for one option as CheckOption, and finish() for all. Nothing if the
+// program is done.
+template <typename CommandLine>
+auto read_command_line(int argc, char** argv, const char* example)
+    -> Result<std::optional<std::decay_t<decltype(std::declval<CommandLine&>().options())>>> {
+  CommandLine line;
+  auto& options = line.options();
+  const CheckOption check = [](const std::string& key, const std::string& text) {
+    return CommandLine().check(key, text);
+  };
+  const auto parsed = parse_with_config(line.app(), argc, argv, check, options.origins, example);
+  if (!parsed) return parsed.error();
+  std::optional<std::decay_t<decltype(options)>> read;
+  if (!*parsed) return read;
+  if (const auto finished = line.finish(); !finished)
+    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
+  options.config_file = config_file_of(line.app());
+  read = std::move(options);
+  return read;
+}
 
 }  // namespace trocar::app

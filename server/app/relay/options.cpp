@@ -201,19 +201,7 @@ Status CommandLine::finish() {
 }  // namespace
 
 Result<std::optional<RelayOptions>> parse_relay_command_line(int argc, char** argv) {
-  CommandLine line;
-  auto& options = line.options();
-  const CheckOption check = [](const std::string& key, const std::string& text) {
-    return CommandLine().check(key, text);
-  };
-  const auto parsed =
-      parse_with_config(line.app(), argc, argv, check, options.origins, kExampleFile);
-  if (!parsed) return parsed.error();
-  if (!*parsed) return std::optional<RelayOptions>();
-  if (const auto finished = line.finish(); !finished)
-    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
-  options.config_file = config_file_of(line.app());
-  return std::optional(std::move(options));
+  return read_command_line<CommandLine>(argc, argv, kExampleFile);
 }
 
 }  // namespace trocar::app

@@ -390,22 +390,13 @@ Status read_lesson(ServerOptions& options) {
 }  // namespace
 
 Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
-  CommandLine line;
-  auto& options = line.options();
-  const CheckOption check = [](const std::string& key, const std::string& text) {
-    return CommandLine().check(key, text);
-  };
-  const auto parsed =
-      parse_with_config(line.app(), argc, argv, check, options.origins, kExampleFile);
-  if (!parsed) return parsed.error();
-  if (!*parsed) return std::optional<ServerOptions>();
-  if (const auto finished = line.finish(); !finished)
-    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
-  if (const auto read = read_lesson(options); !read)
-    return Error{read.error().code, options.origins.placed(read.error().message)};
-  options.config_file = config_file_of(line.app());
+  auto read = read_command_line<CommandLine>(argc, argv, kExampleFile);
+  if (!read || !*read) return read;
+  auto& options = **read;
+  if (const auto lesson = read_lesson(options); !lesson)
+    return Error{lesson.error().code, options.origins.placed(lesson.error().message)};
   if (options.journal.empty()) options.journal = default_journal_path();
-  return std::optional(std::move(options));
+  return read;
 }
 
 }  // namespace trocar::app
