@@ -1,7 +1,6 @@
 #include "common/secure/stream.h"
 
 #include <openssl/ssl.h>
-#include <openssl/x509.h>
 
 #include <array>
 #include <boost/asio/read.hpp>
@@ -57,13 +56,7 @@ asio::awaitable<boost::system::error_code> Stream::begin_tls(const std::string& 
 
 Bytes Stream::peer_certificate_der() {
   if (!has_tls()) return {};
-  X509* certificate = SSL_get1_peer_certificate(std::get<1>(content_).native_handle());
-  if (certificate == nullptr) return {};
-  Bytes der(static_cast<std::size_t>(i2d_X509(certificate, nullptr)));
-  auto* to = der.data();
-  i2d_X509(certificate, &to);
-  X509_free(certificate);
-  return der;
+  return secure::peer_certificate_der(std::get<1>(content_).native_handle());
 }
 
 std::optional<DatagramKey> Stream::datagram_key() {

@@ -1,6 +1,7 @@
 #include "common/secure/tls.h"
 
 #include <openssl/ssl.h>
+#include <openssl/x509.h>
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ssl/context.hpp>
@@ -58,6 +59,24 @@ Result<TlsContext> make_client_context_with_ca(const std::string& ca_file) {
                  "--ca: " + ca_file + ": holds no certificate of a CA: it must be PEM"};
   context->set_verify_mode(asio::ssl::verify_peer);
   return context;
+}
+
+TlsContext make_client_context_with_system_cas() {
+  auto context = make_context(asio::ssl::context::tls_client);
+  boost::system::error_code ignored;  // without any of them nobody is vouched for
+  context->set_default_verify_paths(ignored);
+  context->set_verify_mode(asio::ssl::verify_peer);
+  return context;
+}
+
+Bytes peer_certificate_der(const ssl_st* connection) {
+  X509* certificate = SSL_get1_peer_certificate(connection);
+  if (certificate == nullptr) return {};
+  Bytes der(static_cast<std::size_t>(i2d_X509(certificate, nullptr)));
+  auto* to = der.data();
+  i2d_X509(certificate, &to);
+  X509_free(certificate);
+  return der;
 }
 
 }  // namespace trocar::secure

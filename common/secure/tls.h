@@ -10,12 +10,14 @@
 #include <string>
 
 #include "common/base/asio.h"
+#include "common/base/bytes.h"
 #include "common/base/result.h"
 #include "common/secure/certificate.h"
 
 namespace boost::asio::ssl {
 class context;
 }
+struct ssl_st;
 
 namespace trocar::secure {
 
@@ -26,5 +28,10 @@ using TlsContext = std::shared_ptr<asio::ssl::context>;
 Result<TlsContext> make_server_context(const Identity& identity, const std::string& name);
 TlsContext make_client_context();
 Result<TlsContext> make_client_context_with_ca(const std::string& ca_file);
+// It trusts the authorities that this machine trusts.
+TlsContext make_client_context_with_system_cas();
+
+// Returns the certificate of the other end; empty before the handshake.
+Bytes peer_certificate_der(const ssl_st* connection);
 
 }  // namespace trocar::secure

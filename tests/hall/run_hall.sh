@@ -5,6 +5,7 @@
 #   room      a hall of one core takes what fits and names the numbers of what does not
 #   killed    a killed server goes on from its recording; a client comes back; the third time it fails
 #   found     a killed hall leaves its sessions running, and the next one finds them
+#   tls       the hall's port over TLS: who knows its certificate gets in, the key goes to no other
 #
 # Exit code 77: curl is missing, or a client that was not built.
 set -euo pipefail
@@ -40,6 +41,7 @@ case $test in
   room) base=17720 ;;
   killed) base=17730 ;;
   found) base=17740 ;;
+  tls) base=17750 ;;
   *) fail "$test: no such test" ;;
 esac
 
@@ -255,6 +257,48 @@ test_found() {
   wait $hall || fail "the hall ended with $?"
   hall=
   "$bin/trocar-journal" verify recordings/*-two/session-2.mcap >verified || fail "$(cat verified)"
+}
+
+test_tls() {
+  configure 'cores = 100' 'tls = true' "$lattice"
+  "$bin/trocar-hall" --config hall.toml --check-config | grep -q fine || fail "the file is not fine"
+  [ ! -e hall-state ] || fail "a check has made something"
+  start_hall
+  plain=$at at=https://$at certificate=hall-state/tls/hall.crt
+  ask() { "$bin/trocar-hall" "$@"; }
+  known=(--at "$at" --certificate $certificate --key hall.key)
+  # Who says nothing holds nobody up.
+  exec 3<>"/dev/tcp/127.0.0.1/${plain#*:}"
+  ask start lattice "${known[@]}" >started || fail "no start"
+  grep -qE 'surgeon +[0-9A-Z]{4}-' started || fail "no code: $(cat started)"
+  curl -s --cacert $certificate "$at/sessions" | grep -q lattice-1 || fail "curl is not answered"
+  curl -s --max-time 5 "http://$plain/sessions" && fail "it answers without TLS"
+  refused() { # EXIT_CODE WORDS COMMAND...
+    local expected=$1 words=$2 code=0
+    shift 2
+    ask "$@" >said 2>&1 || code=$?
+    [ $code = "$expected" ] && grep -q -- "$words" said && [ "$(wc -l <said)" = 1 ] || fail "'$*': $code, $(cat said)"
+  }
+  refused 4 'nobody whom this machine trusts' list --at "$at"
+  refused 4 'another certificate' list --at "$at" --certificate hall-state/server/server.crt --key hall.key
+  refused 5 'no hall answers' list --at "$plain"
+  refused 3 'holds no certificate' list --at "$at" --certificate hall.key
+  refused 2 'give --at https://' list --at "$plain" --certificate $certificate
+  cp $certificate before.crt
+  kill -KILL $hall
+  wait $hall || true
+  start_hall
+  cmp before.crt $certificate || fail "another certificate after a restart"
+  ask end lattice-1 --at "https://$at" --certificate $certificate --key hall.key >ended || fail "no end"
+  # A certificate of one's own, named for the hall.
+  kill -TERM $hall
+  wait $hall || fail "the hall ended with $?"
+  hall=
+  configure 'tls = true' 'certificate = "missing.crt"' 'certificate-key = "missing.key"' "$lattice"
+  refused 2 'missing.crt' --config hall.toml --check-config
+  configure 'tls = true' 'certificate = "before.crt"' 'certificate-key = "hall-state/tls/hall.key"' "$lattice"
+  start_hall
+  ask list --at "https://$at" --certificate before.crt >said || fail "$(cat said)"
 }
 
 "test_$test"

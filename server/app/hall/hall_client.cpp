@@ -33,12 +33,18 @@ Result<Json> HallClient::ask(const std::string& method, const std::string& path,
                                                 .path = path,
                                                 .body = body,
                                                 .key = key_,
-                                                .deadline = deadline});
+                                                .deadline = deadline,
+                                                .tls = tls_,
+                                                .certificate_der = certificate_der_});
   const auto where = fmt::format("{}:{}", host_, port_);
+  if (!answer && answer.error().code == ErrorCode::Refused)
+    return Error{ErrorCode::Refused, where + ": " + answer.error().message +
+                                         ": give --certificate with the hall's own"};
   if (!answer)
     return Error{ErrorCode::ResourceMissing, where + ": no hall answers (" +
                                                  answer.error().message +
-                                                 "): start trocar-hall, or give --at HOST:PORT"};
+                                                 "): start trocar-hall, or give --at HOST:PORT, or "
+                                                 "https://HOST:PORT if it has TLS"};
   return read_answer(answer->status, answer->body, where);
 }
 

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <string>
 
+#include "common/base/bytes.h"
 #include "common/base/json.h"
 #include "common/base/result.h"
+#include "common/secure/tls.h"
 #include "server/hall/bus/bus.h"
 
 namespace trocar::app {
@@ -24,9 +26,14 @@ class HallConnection {
 
 class HallClient final : public HallConnection {
  public:
-  // `key`: empty if there is none.
-  HallClient(std::string host, std::uint16_t port, std::string key)
-      : host_(std::move(host)), port_(port), key_(std::move(key)) {}
+  // `key`: empty if there is none. `tls` null: without. `certificate_der`: as HttpQuestion has it.
+  HallClient(std::string host, std::uint16_t port, std::string key, secure::TlsContext tls,
+             Bytes certificate_der)
+      : host_(std::move(host)),
+        port_(port),
+        key_(std::move(key)),
+        tls_(std::move(tls)),
+        certificate_der_(std::move(certificate_der)) {}
 
   Result<Json> ask(const std::string& method, const std::string& path, const std::string& body,
                    std::chrono::seconds deadline) const override;
@@ -35,6 +42,8 @@ class HallClient final : public HallConnection {
   const std::string host_;
   const std::uint16_t port_;
   const std::string key_;
+  const secure::TlsContext tls_;
+  const Bytes certificate_der_;
 };
 
 class BusHallClient final : public HallConnection {

@@ -8,6 +8,8 @@
 
 #include "common/base/json.h"
 #include "common/base/printable.h"
+#include "common/secure/certificate.h"
+#include "common/secure/private_files.h"
 #include "server/app/hall/hall_bus.h"
 #include "server/app/hall/hall_client.h"
 #include "server/app/hall/hall_server.h"
@@ -227,7 +229,18 @@ Status run_hall_command(const HallOptions& options) {
     key = std::move(*read);
   }
   if (!options.nats.url.empty()) return run_on_bus(options, key);
-  const HallClient client(options.host, options.port, key);
+  Bytes certificate_der;
+  if (!options.certificate_file.empty()) {
+    const auto text = secure::read_small_file(options.certificate_file);
+    if (!text) return Error{text.error().code, "--certificate: " + text.error().message};
+    auto der = secure::certificate_der(*text, "--certificate: " + options.certificate_file);
+    if (!der) return der.error();
+    certificate_der = std::move(*der);
+  }
+  const auto tls = !options.has_tls          ? nullptr
+                   : certificate_der.empty() ? secure::make_client_context_with_system_cas()
+                                             : secure::make_client_context();
+  const HallClient client(options.host, options.port, key, tls, certificate_der);
   switch (options.command) {
     case HallCommand::List:
       return list(client, options.is_json);

@@ -67,7 +67,7 @@ Status run_hall(const HallOptions& options) {
   auto sessions =
       hall::Sessions::open(context, std::move(start->config), std::move(start->server_program));
   if (!sessions) return sessions.error();
-  auto server = HallServer::listen(context, **sessions, start->key);
+  auto server = HallServer::listen(context, **sessions, start->key, start->tls);
   if (!server) return server.error();
   std::unique_ptr<HallBus> bus;
   if (!options.nats.url.empty()) {

@@ -4,10 +4,12 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/ssl/stream_base.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/ssl/ssl_stream.hpp>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -102,14 +104,16 @@ std::string exposition(const hall::Sessions& sessions) {
 struct HallServer::Core {
   hall::Sessions& sessions;
   const secure::Digest key;
+  const secure::TlsContext tls;
   access::AuditLog audit;
   std::uint64_t wrong_proof_ns = 0;  // when one was last noted
   monitoring::HttpAcceptor acceptor;
 
   Core(asio::io_context& context, hall::Sessions& all, const std::string& secret,
-       access::AuditLog log)
+       secure::TlsContext with, access::AuditLog log)
       : sessions(all),
         key(digest_of(secret)),
+        tls(std::move(with)),
         audit(std::move(log)),
         acceptor(context, kMostConnections) {}
 
@@ -122,11 +126,22 @@ struct HallServer::Core {
   asio::awaitable<void> serve(beast::tcp_stream stream) {
     beast::error_code unknown;
     const auto peer = stream.socket().remote_endpoint(unknown).address().to_string();
+    if (!tls) co_return co_await serve_on(stream, peer);
+    beast::ssl_stream<beast::tcp_stream> sealed(std::move(stream), *tls);
+    beast::get_lowest_layer(sealed).expires_after(kRequestDeadline);
+    const auto [failed] = co_await sealed.async_handshake(asio::ssl::stream_base::server, kNoThrow);
+    if (!failed) co_await serve_on(sealed, peer);
+  }
+
+  // The caller's objects outlive it: it is awaited at once.
+  template <typename Stream>
+  asio::awaitable<void> serve_on(Stream& stream, const std::string& peer) {
+    auto& connection = beast::get_lowest_layer(stream);
     beast::flat_buffer buffer(kMostHeadBytes + hall::kMostRequestBytes);
     http::request_parser<http::string_body> parser;
     parser.header_limit(kMostHeadBytes);
     parser.body_limit(hall::kMostRequestBytes);
-    stream.expires_after(kRequestDeadline);
+    connection.expires_after(kRequestDeadline);
     const auto [failed, count] = co_await http::async_read(stream, buffer, parser, kNoThrow);
     Reply given;
     if (failed == http::error::body_limit)
@@ -144,11 +159,11 @@ struct HallServer::Core {
       answer.set(http::field::www_authenticate, "Bearer");
     answer.body() = std::move(given.body);
     answer.prepare_payload();
-    stream.expires_after(kRequestDeadline);
+    connection.expires_after(kRequestDeadline);
     const auto [unsent, bytes] = co_await http::async_write(stream, answer, kNoThrow);
     if (unsent) co_return;
     beast::error_code ignored;
-    stream.socket().shutdown(asio::socket_base::shutdown_send, ignored);
+    connection.socket().shutdown(asio::socket_base::shutdown_send, ignored);
   }
 
   Trust trust_in(const Request& request) const {
@@ -269,11 +284,13 @@ struct HallServer::Core {
 };
 
 Result<std::unique_ptr<HallServer>> HallServer::listen(asio::io_context& context,
-                                                       hall::Sessions& sessions, std::string key) {
+                                                       hall::Sessions& sessions, std::string key,
+                                                       secure::TlsContext tls) {
   const auto& config = sessions.config();
   auto audit = access::AuditLog::open(config.state_folder / "audit.jsonl");
   if (!audit) return audit.error();
-  const auto core = std::make_shared<Core>(context, sessions, key, std::move(*audit));
+  const auto core =
+      std::make_shared<Core>(context, sessions, key, std::move(tls), std::move(*audit));
   if (const auto opened = core->acceptor.open(config.address, config.port, "listen"); !opened)
     return opened.error();
   core->acceptor.start(

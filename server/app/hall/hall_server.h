@@ -1,6 +1,6 @@
 #pragma once
 
-// The hall answers over HTTP:
+// The hall answers over HTTP, with TLS where it has a certificate:
 //
 //   GET /sessions          all of them; join codes only with the key
 //   GET /sessions/NAME     one of them
@@ -26,6 +26,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "common/secure/tls.h"
 #include "server/hall/bus/proof.h"
 #include "server/hall/sessions/sessions.h"
 
@@ -39,10 +40,11 @@ class HallServer {
   static constexpr std::chrono::seconds kWrongKeyDelay{1};
   static constexpr std::chrono::seconds kEndDeadline{90};
 
-  // `sessions` outlives it. ErrorCode::Usage for what is no address, ErrorCode::ResourceMissing
-  // when it cannot be had.
+  // `sessions` outlives it. `tls` null: without. ErrorCode::Usage for what is no address,
+  // ErrorCode::ResourceMissing when it cannot be had.
   static Result<std::unique_ptr<HallServer>> listen(asio::io_context& context,
-                                                    hall::Sessions& sessions, std::string key);
+                                                    hall::Sessions& sessions, std::string key,
+                                                    secure::TlsContext tls);
   ~HallServer();
 
   std::uint16_t port() const;

@@ -8,6 +8,7 @@
 
 #include "common/base/log.h"
 #include "common/secure/digest.h"
+#include "common/secure/kept_identity.h"
 #include "common/secure/private_files.h"
 #include "server/organs/catalogue/load_organ.h"
 
@@ -52,6 +53,22 @@ Result<hall::HallConfig> read_config(const HallOptions& options) {
   return config;
 }
 
+// Makes the hall's own certificate if it has to, in a folder that is nobody else's.
+Result<secure::TlsContext> read_certificate(const hall::HallConfig& config) {
+  const auto folder = config.state_folder / "tls";
+  if (config.certificate_file.empty())
+    for (const auto& made : {config.state_folder, folder})
+      if (const auto is_made = secure::make_private_folder(made); !is_made) return is_made.error();
+  const auto kept = secure::read_or_make_identity(config.certificate_file,
+                                                  config.certificate_key_file, folder, "hall");
+  if (!kept) return kept.error();
+  const bool is_own = config.certificate_file.empty();
+  const auto name =
+      is_own ? kept->source : "certificate, certificate-key: " + config.certificate_file;
+  log::info("TLS with the certificate {}", is_own ? kept->source : config.certificate_file);
+  return secure::make_server_context(kept->identity, name);
+}
+
 Status check_program() {
   const auto program = server_program();
   if (::access(program.c_str(), X_OK) == 0) return {};
@@ -83,6 +100,10 @@ Result<HallStart> prepare_hall(const HallOptions& options) {
   auto key = read_or_make_hall_key(start.config.key_file);
   if (!key) return key.error();
   start.key = std::move(*key);
+  if (!start.config.has_tls) return start;
+  auto tls = read_certificate(start.config);
+  if (!tls) return tls.error();
+  start.tls = std::move(*tls);
   return start;
 }
 
@@ -93,6 +114,8 @@ Status check_hall_start(const HallOptions& options) {
   std::error_code ignored;
   if (fs::exists(config->key_file, ignored))
     if (const auto key = read_key(config->key_file); !key) return key.error();
+  if (!config->certificate_file.empty())
+    if (const auto tls = read_certificate(*config); !tls) return tls.error();
   for (const auto& offer : config->offers)
     if (const auto organ = catalogue::load_organ(offer.organ); !organ)
       return Error{organ.error().code,

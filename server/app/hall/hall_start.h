@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "common/secure/tls.h"
 #include "server/app/hall/options.h"
 #include "server/hall/plan/hall_config.h"
 
@@ -14,10 +15,11 @@ namespace trocar::app {
 struct HallStart {
   hall::HallConfig config;
   std::string key;
+  secure::TlsContext tls;  // null: without
   std::filesystem::path server_program;
 };
 
-// Reads what is there, and makes key and folder of state if they are missing.
+// Reads what is there, and makes key, certificate and folder of state if they are missing.
 Result<HallStart> prepare_hall(const HallOptions& options);
 // Says whether prepare_hall() would succeed, and whether each organ can be read, without making
 // anything.

@@ -8,6 +8,8 @@
 namespace trocar::app {
 namespace {
 
+constexpr std::string_view kHttps = "https://";
+
 constexpr const char* kHallExamples = R"(
 Examples:
   trocar-hall --config hall.toml
@@ -16,6 +18,8 @@ Examples:
       would a start with this file succeed?
   trocar-hall start find-the-lump --key hall.key
       starts a session and prints its address and join codes
+  trocar-hall list --at https://theatre:7694 --certificate hall.crt --key hall.key
+      a hall on another machine, with tls = true in its file; hall.crt lies in its folder of state
   trocar-hall list --key hall.key
       the sessions that run, with their codes; without the key also, but then without codes
   trocar-hall end find-the-lump-1 --key hall.key
@@ -47,18 +51,26 @@ void add_nats_options(CLI::App& app, HallOptions& options, const char* meaning) 
 }
 
 void add_command_options(CLI::App& command, HallOptions& options) {
-  command.add_option("--at", options.at, "where the hall is")
+  command.add_option("--at", options.at, "where the hall is; https://HOST:PORT: over TLS")
       ->type_name("HOST:PORT")
       ->capture_default_str();
+  command
+      .add_option("--certificate", options.certificate_file,
+                  "the certificate that the hall has to show (PEM) [one that this machine trusts, "
+                  "of this host]")
+      ->type_name("FILE");
   add_nats_options(command, options, "ask all halls of this NATS instead");
   command.add_option("--key", options.key_file, "file with the hall's key")->type_name("FILE");
 }
 
 Status parse_at(HallOptions& options) {
-  const auto& text = options.at;
+  std::string text = options.at;
+  options.has_tls = text.starts_with(kHttps);
+  if (options.has_tls) text.erase(0, kHttps.size());
   const auto colon = text.rfind(':');
   const Error bad{ErrorCode::Usage,
-                  "--at: '" + text + "' is not HOST:PORT, such as 127.0.0.1:7694"};
+                  "--at: '" + options.at +
+                      "' is neither HOST:PORT, such as 127.0.0.1:7694, nor https://HOST:PORT"};
   if (colon == std::string::npos || colon == 0) return bad;
   options.host = text.substr(0, colon);
   if (options.host.starts_with('[') && options.host.ends_with(']'))
@@ -67,6 +79,9 @@ Status parse_at(HallOptions& options) {
   const auto parsed = std::from_chars(text.data() + colon + 1, end, options.port);
   if (options.host.empty() || parsed.ec != std::errc{} || parsed.ptr != end || options.port == 0)
     return bad;
+  if (!options.certificate_file.empty() && !options.has_tls)
+    return Error{ErrorCode::Usage,
+                 "--certificate: is for a hall with TLS, give --at https://HOST:PORT"};
   return {};
 }
 

@@ -20,10 +20,12 @@ struct HallOptions {
   bool checks_config = false;
   // These belong to a command.
   std::string at = "127.0.0.1:7694", host;
-  std::uint16_t port = 0;  // of `at`
-  std::string key_file;    // empty: without a key
-  std::string what;        // the lesson to start, the session to end
-  std::string name;        // of a new session; empty: the hall gives one
+  std::uint16_t port = 0;        // of `at`
+  bool has_tls = false;          // likewise
+  std::string certificate_file;  // what the hall has to show; empty: what this machine trusts
+  std::string key_file;          // empty: without a key
+  std::string what;              // the lesson to start, the session to end
+  std::string name;              // of a new session; empty: the hall gives one
   bool is_json = false;
   hall::BusPlace nats;  // of both; without a URL: none
 };

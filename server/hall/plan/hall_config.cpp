@@ -67,10 +67,19 @@ void read_access(tool::TableReader& table, HallConfig& config) {
     if (!read_place(*listen, config.address, config.port))
       table.fail("listen", "is not ADDRESS:PORT, such as 127.0.0.1:7694");
   config.is_open_without_tls = table.boolean("open-without-tls").value_or(false);
-  if (!config.is_open_without_tls && !secure::is_loopback(config.address))
+  config.has_tls = table.boolean("tls").value_or(false);
+  config.certificate_file = table.string("certificate").value_or("");
+  config.certificate_key_file = table.string("certificate-key").value_or("");
+  if (config.certificate_file.empty() != config.certificate_key_file.empty())
+    table.fail("certificate", "needs certificate-key, and the other way round: name both files");
+  if (!config.certificate_file.empty() && !config.has_tls)
+    table.fail("certificate", "is for TLS only, write tls = true");
+  if (config.has_tls && config.is_open_without_tls)
+    table.fail("open-without-tls", "is true and so is tls, write one of them");
+  if (!config.has_tls && !config.is_open_without_tls && !secure::is_loopback(config.address))
     table.fail("listen", "others can reach " + config.address +
-                             " and could read the key on its way: use 127.0.0.1, or write "
-                             "open-without-tls = true");
+                             " and could read the key on its way: write tls = true, or "
+                             "open-without-tls = true where you trust the network");
   config.key_file = table.string("key").value_or("");
   if (!table.has("key")) table.fail_missing("key", "write key = \"hall.key\", a file");
 }

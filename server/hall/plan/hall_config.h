@@ -36,7 +36,10 @@ struct PortRange {
 struct HallConfig {
   std::string address = "127.0.0.1";  // of the hall itself
   std::uint16_t port = 7694;
+  bool has_tls = false;
   bool is_open_without_tls = false;  // others than this machine may reach it
+  // With TLS: the hall's own are made if these are empty.
+  std::string certificate_file, certificate_key_file;
   std::string key_file;
   std::filesystem::path recordings_folder, state_folder;
   std::string sessions_address = "127.0.0.1";

@@ -1,6 +1,6 @@
 #pragma once
 
-// One request to another program over HTTP, without TLS, and its answer.
+// One request to another program over HTTP, with TLS or without, and its answer.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -9,7 +9,9 @@
 #include <cstdint>
 #include <string>
 
+#include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/secure/tls.h"
 
 namespace trocar::monitoring {
 
@@ -20,6 +22,8 @@ struct HttpQuestion {
   std::string body;                  // JSON
   std::string key;                   // as a bearer's token; empty: none
   std::chrono::seconds deadline{5};  // for all of it, after the host's name is looked up
+  secure::TlsContext tls;            // null: without TLS
+  Bytes certificate_der;             // what it has to show; empty: what `tls` trusts, of this host
 };
 
 struct HttpAnswer {
@@ -30,7 +34,8 @@ struct HttpAnswer {
 inline constexpr std::size_t kMostAnswerBytes = 1u << 20;
 
 // Runs on the coroutine's executor. ErrorCode::ResourceMissing with the reason if nothing answers
-// in time, or what answers speaks no HTTP, or says more than kMostAnswerBytes. The deadline does
+// in time, or what answers speaks no HTTP, or says more than kMostAnswerBytes; ErrorCode::Refused
+// if its certificate is a wrong one, and then nothing was asked. The deadline does
 // not hold for the name: its servers have their own. An address needs none.
 asio::awaitable<Result<HttpAnswer>> ask(HttpQuestion question);
 // The same for who has no I/O thread: returns when there is the answer, or the error.
