@@ -28,8 +28,8 @@ namespace {
 
 volatile std::sig_atomic_t stop_requested = 0;
 
-constexpr std::uint64_t kPollNs = 4'000'000;       // samples of mouse and scripts leave every 8 ms
-constexpr std::uint64_t kGoodbyeNs = 400'000'000;  // time to say Bye
+constexpr std::uint64_t kPollNs = 4'000'000;  // samples of mouse and scripts leave every 8 ms
+constexpr std::uint64_t kGoodbyeNs = 2'500'000'000;  // longer than its source waits for that
 
 class Run {
  public:

@@ -28,7 +28,7 @@ using std::chrono::milliseconds;
 constexpr double kWarmUpSeconds = 1;  // in which clocks and paths are found
 constexpr milliseconds kPoll{4};
 constexpr milliseconds kPing{100};
-constexpr std::uint64_t kGoodbyeNs = 400'000'000;
+constexpr std::uint64_t kGoodbyeNs = 2'500'000'000;  // longer than its source waits
 
 double seconds_between(std::uint64_t begin_ns, std::uint64_t end_ns) {
   return static_cast<double>(end_ns - begin_ns) * 1e-9;

@@ -16,7 +16,9 @@
 namespace trocar::net {
 namespace {
 
-constexpr std::chrono::milliseconds kCloseDeadline{200};
+// A busy server is given time to read the Bye: who ends before that resets the connection, and the
+// place is kept as if it were lost.
+constexpr std::chrono::milliseconds kCloseDeadline{2000};
 // How soon a full inbound queue is looked at again: well below one frame.
 constexpr std::chrono::milliseconds kRoomRetry{2};
 constexpr std::size_t kBuffersPerWrite = 16;

@@ -107,6 +107,32 @@ TEST(Return, a_broken_connection_comes_back_to_the_same_place_with_a_new_keyfram
   EXPECT_TRUE(session.wait_for_sessions(0));
 }
 
+// What the server writes to who has ended resets the connection, with the Bye that it has not read.
+TEST(Return, who_leaves_a_busy_server_leaves_no_place_behind) {
+  GuardedSession guarded;
+  auto& session = *guarded.session;
+  session.publish(10);
+  std::thread busy;
+  {
+    net::NetSource source(guarded_options(guarded, Role::Surgeon));
+    Collector sink;
+    ASSERT_TRUE(poll_until(source, sink, [&] { return source.statistics().frames_received == 1; }));
+    const std::vector frames{session.make_frame(10), session.make_frame(10)};
+    busy = std::thread([&session, frames] {
+      session.on_io([&] {
+        std::this_thread::sleep_for(milliseconds(600));
+        session.replicator().publish(frames);
+      });
+    });
+    std::this_thread::sleep_for(milliseconds(50));
+    source.close("done");
+    EXPECT_TRUE(becomes(source, sink, SourceState::Closed));
+  }
+  busy.join();
+  ASSERT_TRUE(session.wait_for_sessions(0));
+  EXPECT_TRUE(session.on_io([&] { return session.replicator().roster().list().empty(); }));
+}
+
 TEST(Return, a_silent_server_counts_as_broken_and_its_hanging_connection_is_replaced) {
   LiveSession session;
   session.publish(10);
