@@ -51,6 +51,8 @@ Status run_export(const ExportCommand& command) {
   if (!has_tets && ending != ".stl" && ending != ".glb")
     return Error{ErrorCode::Usage,
                  "--out: " + command.out + ": the file must end with .msh, .vtu, .stl or .glb"};
+  if (ending == ".glb" && *unit != mesh::Unit::Metre)
+    return Error{ErrorCode::Usage, "--unit: " + command.out + ": .glb is in m"};
   const auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
   if (has_tets && organ->mesh.tets.empty())
