@@ -102,6 +102,10 @@ Result<mesh::ImportedMesh> fill_labels(label_map::LabelMap map, const std::strin
     for (const auto& [label, name] : *labels) numbers.push_back(label);
   const auto solid = label_map::LabelSolid::make(std::move(map), numbers, file);
   if (!solid) return solid.error();
+  if (solid->labels().size() > organ::kMaxRegions)
+    return Error{ErrorCode::BadFile,
+                 fmt::format("{}: has {} labels, an organ may have {}: choose some (--labels)",
+                             file, solid->labels().size(), organ::kMaxRegions)};
   auto filled = label_map::mesh_labels(*solid, *nodes, *labels, file);
   if (!filled) return filled.error();
   notes = std::move(filled->notes);
