@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "common/base/assert.h"
+#include "common/image/image.h"
 #include "common/journal/session_journal.h"
 #include "common/lesson/course.h"
 #include "common/secure/datagram_channel.h"
@@ -334,6 +335,13 @@ bool decode_glb(BytesView bytes) {
   return decode_mesh<kGlb>(file);
 }
 
+bool decode_image(BytesView bytes) {
+  const auto image = image::decode(text_of(bytes));
+  TROCAR_ASSERT(!image.ok() ||
+                image->pixels.size() == std::size_t(image->width) * std::size_t(image->height));
+  return checked(image);
+}
+
 bool decode_nifti(BytesView bytes) {
   auto map = label_map::parse_nifti(text_of(bytes), std::nullopt, "a.nii");
   return checked(map) && checked(label_map::LabelSolid::make(std::move(*map), {}, "a.nii"));
@@ -416,6 +424,7 @@ constexpr Decoder kDecoders[] = {
     {"obj", decode_mesh<kObj>},
     {"ply", decode_mesh<kPly>},
     {"glb", decode_glb},
+    {"image", decode_image},
     {"nifti", decode_nifti},
     {"dicom", decode_dicom},
     {"script", decode_script},
