@@ -49,7 +49,7 @@ EditorWindow::EditorWindow(edit::Editor& editor, const WindowSettings& settings,
       context_(std::move(context)),
       renderer_(*context_),
       hud_(*context_, settings.scale),
-      view_(editor.organ().mesh),
+      view_(editor.organ()),
       brush_(editor.organ().mesh) {
   set_text(state_.file, settings.file);
   const auto& positions = editor.organ().mesh.rest_positions;
@@ -100,7 +100,7 @@ void EditorWindow::draw(float seconds) {
   take_keys();
   act(actions);
   follow_organ();
-  auto scene = view_.scene(state_.shows_held, state_.shows_regions);
+  auto scene = view_.scene(state_.shows_held, state_.shows_regions, state_.shows_fine());
   scene.seconds = seconds;
   press_.add_to(scene);
   ImGui::Render();
@@ -128,6 +128,7 @@ void EditorWindow::take_keys() {
     if (key.code == GLFW_KEY_2) state_.mode = Mode::Hold;
     if (key.code == GLFW_KEY_3) state_.mode = Mode::Region;
     if (key.code == GLFW_KEY_4) state_.mode = Mode::Press;
+    if (key.code == GLFW_KEY_F) state_.wants_fine = !state_.wants_fine;
     if (key.code == GLFW_KEY_C) camera_.frame({}, view_.radius_m());
   }
 }
@@ -325,7 +326,7 @@ void EditorWindow::take_picture() {
                       std::chrono::system_clock::now().time_since_epoch())
                       .count();
   const std::string file = "trocar-" + std::to_string(ms) + ".png";
-  auto scene = view_.scene(state_.shows_held, state_.shows_regions);
+  auto scene = view_.scene(state_.shows_held, state_.shows_regions, state_.shows_fine());
   press_.add_to(scene);
   renderer_.draw(scene, camera_, region_, render::Quality::Best);
   hud_.render();

@@ -7,7 +7,10 @@
 
 namespace trocar::editor {
 
-OrganView::OrganView(const mesh::TetMesh& mesh) : mesh_(mesh) {
+OrganView::OrganView(const organ::Organ& organ) : mesh_(organ.mesh) {
+  if (!organ.fine_surface.empty())
+    fine_ = std::make_shared<const wire::FineSurface>(organ.fine_surface);
+  const auto& mesh = organ.mesh;
   std::vector<std::uint32_t> vertex_of(mesh.node_count());
   for (const NodeIndex node : mesh.surface_nodes) {
     vertex_of[node.value] = static_cast<std::uint32_t>(rest_.size());
@@ -66,11 +69,12 @@ Vec3d OrganView::normal_at(const edit::SurfacePlace& place) const {
   return normalized(cross(p[b.value] - p[a.value], p[c.value] - p[a.value]), Vec3d{0, 1, 0});
 }
 
-render::SceneView OrganView::scene(bool shows_held, bool shows_regions) const {
+render::SceneView OrganView::scene(bool shows_held, bool shows_regions, bool shows_fine) const {
   render::SceneView scene;
   scene.topology_version = 1;
   scene.rest_positions = rest_;
   scene.triangles = triangles_;
+  if (shows_fine) scene.fine_surface = fine_;
   scene.positions = positions_;
   scene.holds = colours(shows_held, shows_regions);
   return scene;

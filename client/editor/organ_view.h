@@ -4,12 +4,14 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "client/device/view_rays.h"
 #include "client/render/scene_renderer.h"
+#include "common/wire/fine_surface.h"
 #include "server/organs/edit/surface_brush.h"
 #include "server/organs/organ/organ.h"
 
@@ -25,7 +27,8 @@ constexpr std::uint8_t colour_of_part(std::size_t region) {
 
 class OrganView {
  public:
-  explicit OrganView(const mesh::TetMesh& mesh);
+  // The organ must outlive it, with its mesh as it is.
+  explicit OrganView(const organ::Organ& organ);
 
   // Takes over what is held and where the regions are.
   void colour(const organ::Organ& organ);
@@ -36,15 +39,17 @@ class OrganView {
   // Outward normal of the place's triangle at rest, unit length.
   Vec3d normal_at(const edit::SurfacePlace& place) const;
 
-  // The spans are of this object.
-  render::SceneView scene(bool shows_held, bool shows_regions) const;
+  // The spans are of this object. shows_fine: the fine surface takes the mesh's place, if there is
+  // one.
+  render::SceneView scene(bool shows_held, bool shows_regions, bool shows_fine) const;
   // The colour of each surface node, in the order of mesh.surface_nodes.
   std::vector<render::Hold> colours(bool shows_held, bool shows_regions) const;
   float radius_m() const { return radius_m_; }  // half the diagonal of the rest bounding box
 
  private:
   const mesh::TetMesh& mesh_;
-  std::vector<Vec3f> rest_, positions_;  // per surface node
+  std::shared_ptr<const wire::FineSurface> fine_;  // null: there is none
+  std::vector<Vec3f> rest_, positions_;            // per surface node
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   std::vector<std::uint16_t> parts_;   // per surface node: 0 the organ's own, r + 1 regions[r]
   std::vector<std::uint8_t> is_held_;  // likewise

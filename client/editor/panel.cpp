@@ -276,6 +276,13 @@ PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
   patch(colour_of(shape::colour_of_slot(kHeldColour)));
   ImGui::TextUnformatted("held nodes");
   ImGui::Checkbox("regions", &state.shows_regions);
+  if (!editor.organ().fine_surface.empty()) {
+    ImGui::Checkbox("F  fine surface", &state.wants_fine);
+    if (state.wants_fine && !state.shows_fine()) {
+      ImGui::SameLine();
+      ImGui::TextDisabled("not while painting");
+    }
+  }
   ImGui::PopItemWidth();
   ImGui::End();
   draw_questions(state, actions);

@@ -34,7 +34,7 @@ struct PanelState {
   std::size_t choice = 0;  // of the materials; the one after the last is neo-Hookean
   float young_modulus_kpa = 4;
   float tip_mm = 10, press_mm = 6;  // radius, and how far the hand goes in
-  bool shows_held = true, shows_regions = true;
+  bool shows_held = true, shows_regions = true, wants_fine = true;
   std::string message;
   bool is_trouble = false;
   bool asks_to_replace = false, asks_to_close = false;
@@ -47,6 +47,8 @@ struct PanelState {
     };
     return {metres(low_mm), metres(high_mm), is_on_surface && mode != Mode::Region};
   }
+  // The brush touches the mesh, which is shown while it paints.
+  bool shows_fine() const { return wants_fine && mode != Mode::Hold && mode != Mode::Region; }
   void say(std::string text, bool is_bad = false) {
     message = std::move(text);
     is_trouble = is_bad;

@@ -18,14 +18,14 @@ std::string to_text(const Json& json);
 
 // Returns the whole number at a key. Throws std::out_of_range where there is another value, or one
 // that T cannot hold: for those, get() of the library is undefined behaviour.
-template <typename T>
-T whole_number(const Json& json, const char* key) {
-  const Json& value = json.at(key);
+template <typename T, typename AnyJson>
+T whole_number(const AnyJson& json, const char* key) {
+  const AnyJson& value = json.at(key);
   if (value.is_number_unsigned()) {
-    if (const auto number = value.get<std::uint64_t>(); std::in_range<T>(number))
+    if (const auto number = value.template get<std::uint64_t>(); std::in_range<T>(number))
       return static_cast<T>(number);
   } else if (value.is_number_integer()) {
-    if (const auto number = value.get<std::int64_t>(); std::in_range<T>(number))
+    if (const auto number = value.template get<std::int64_t>(); std::in_range<T>(number))
       return static_cast<T>(number);
   }
   throw std::out_of_range(std::string(key) + " is no whole number in its range");

@@ -10,6 +10,7 @@ find_package(Ceres REQUIRED)
 find_package(Eigen3 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(ZLIB REQUIRED)
+find_path(STB_INCLUDE stb/stb_image.h REQUIRED)
 find_package(DCMTK REQUIRED CONFIG)
 find_package(OpenSSL 3.0 REQUIRED)
 # Only its libraries: the definition that comes with them would keep out the precompiled headers.

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <fstream>
+#include <string_view>
 
 #include "server/organs/organ/organ_file.h"
 #include "tests/support/program_fixture.h"
@@ -59,6 +62,58 @@ TEST_F(OrganProgram, MakesOrgansWithFibresAndShowsThem) {
   EXPECT_EQ(number_after(json, "\"tear_stretch\": "), 1.5);
   ASSERT_EQ(run({"inspect", at("a.organ")}), 0);
   EXPECT_NE(log().find("directed fibres     at "), std::string::npos) << log();
+}
+
+// A binary STL file in which each vertex is turned, and whose header says the axes.
+std::string turned_stl(std::string file, std::string_view header, float side) {
+  std::copy(header.begin(), header.end(), file.begin());
+  for (std::size_t at = 84 + 12; at + 36 <= file.size(); at += 50)
+    for (std::size_t corner = at; corner < at + 36; corner += 12)
+      for (const std::size_t axis : {0u, 4u}) {
+        float value = 0;
+        std::memcpy(&value, &file[corner + axis], sizeof value);
+        value *= side;
+        std::memcpy(&file[corner + axis], &value, sizeof value);
+      }
+  return file;
+}
+
+TEST_F(OrganProgram, AFineSurfaceIsTurnedFromItsAxesToThoseOfTheOtherFile) {
+  ASSERT_EQ(run({"export", "liver", "--unit", "mm", "--out", at("unsaid.stl")}), 0) << log();
+  std::ifstream in(at("unsaid.stl"), std::ios::binary);
+  const std::string file{std::istreambuf_iterator<char>(in), {}};
+  const auto unsaid = at("unsaid.stl"), lps = write("lps.stl", turned_stl(file, "SPACE=LPS", 1)),
+             ras = write("ras.stl", turned_stl(file, "SPACE=RAS", -1));
+  const auto embed = [&](const std::string& organ, const std::string& fine,
+                         const std::string& frame = "auto") {
+    return run({"import", organ, "--unit", "mm", "--nodes", "1000", "--embed", fine,
+                "--embed-frame", frame, "--out", at("fine.organ")});
+  };
+  ASSERT_EQ(embed(lps, ras), 0) << log();
+  EXPECT_NE(log().find("ras.stl: read in mm, turned from RAS, as the file says"), std::string::npos)
+      << log();
+  ASSERT_EQ(embed(lps, lps), 0) << log();
+  EXPECT_EQ(log().find("turned"), std::string::npos) << log();
+  EXPECT_EQ(embed(unsaid, lps), 2);
+  expect_line("lps.stl: says that its axes are LPS, and ");
+  EXPECT_EQ(embed(unsaid, lps, "file"), 0) << log();
+  EXPECT_EQ(embed(lps, unsaid), 0) << log();
+}
+
+TEST_F(OrganProgram, AGlbFileIsInMetres) {
+  EXPECT_EQ(run({"export", "plate", "--unit", "mm", "--out", at("plate.glb")}), 2);
+  expect_line("plate.glb: .glb is in m");
+  EXPECT_FALSE(std::filesystem::exists(at("plate.glb")));
+  EXPECT_EQ(run({"export", "plate", "--out", at("plate.glb")}), 0) << log();
+}
+
+TEST_F(OrganProgram, OptionsOfAFineSurfaceNeedOne) {
+  for (const auto& [option, value] :
+       {std::pair{"--embed-frame", "ras"}, {"--embed-unit", "mm"}, {"--embed-picture", "a.png"}}) {
+    EXPECT_EQ(run({"import", "a.stl", option, value}), 2);
+    expect_line(option);
+    expect_line("requires --embed");
+  }
 }
 
 TEST_F(OrganProgram, RefusesFibresAndTearsThatCannotBe) {

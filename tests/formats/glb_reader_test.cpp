@@ -243,11 +243,20 @@ TEST(GlbReader, WhatCannotBeReadIsNamed) {
       {"nodes[0] has a skin", [](Glb& g) { g.json["nodes"][0]["skin"] = 0; }},
       {"is below two others, or below itself",
        [](Glb& g) { g.json["nodes"][0]["children"] = {0}; }},
-      {"rotation is not of length 1",
+      {"meshes[0].primitives[0]: vertex 0 is not finite",
+       [](Glb& g) {
+         g.json["nodes"] = Json::array({{{"children", {1}}, {"scale", {1e200, 1, 1}}},
+                                        {{"mesh", 0}, {"scale", {1e200, 1, 1}}}});
+       }},
+      {"nodes[0]: children holds what is no node's number",
+       [](Glb& g) { g.json["nodes"][0]["children"] = {"1"}; }},
+      {"nodes[123456789] is not there",
+       [](Glb& g) { g.json["nodes"][0]["children"] = {123456789}; }},
+      {"nodes[0]: rotation is not of length 1",
        [](Glb& g) {
          g.json["nodes"][0]["rotation"] = {1, 1, 0, 0};
        }},
-      {"scale has not 3 numbers",
+      {"nodes[0]: scale has not 3 numbers",
        [](Glb& g) {
          g.json["nodes"][0]["scale"] = {1, 1};
        }},
@@ -286,6 +295,43 @@ TEST(GlbReader, ManyNodesOfOneMeshBuildNoMoreThanTheirShare) {
   const auto raw = parse_glb(glb.file(), "a.glb");
   ASSERT_FALSE(raw.ok());
   EXPECT_NE(raw.error().message.find("far more than the file's"), std::string::npos);
+}
+
+TEST(GlbReader, NodesThatWaitAreCountedAsThoseThatWereRead) {
+  // Each node of a chain leaves a thousand more waiting, all the same one.
+  EXPECT_EQ(error_after([](Glb& g) {
+              g.json["nodes"] = Json::array();
+              for (int i = 0; i < 20; ++i) {
+                std::vector<int> children(1001, 0);
+                children[0] = i + 1;
+                g.json["nodes"].push_back({{"children", children}});
+              }
+            }),
+            "a.glb: has more than 10,000 nodes");
+}
+
+TEST(GlbReader, JsonThatIsFarMoreThanItsFileIsRefusedBeforeItIsRead) {
+  const auto error_of = [](std::size_t lists) {
+    return error_after([&](Glb& g) { g.json["extras"] = std::vector<Json>(lists, Json::array()); });
+  };
+  EXPECT_EQ(error_of(20'000), "");
+  const auto error = error_of(60'000);
+  EXPECT_NE(error.find("its JSON of some 120"), std::string::npos) << error;
+}
+
+TEST(GlbReader, PrimitivesOfAllNodesAreCounted) {
+  const auto error = error_after([](Glb& g) {
+    for (int i = 0; i < 1000; ++i) g.json["meshes"][0]["primitives"].push_back({{"mode", 1}});
+    g.json["nodes"] = std::vector<Json>(100, Json{{"mesh", 0}});
+    for (int i = 1; i < 100; ++i) g.json["scenes"][0]["nodes"].push_back(i);
+  });
+  EXPECT_NE(error.find("more than 100,000 primitives"), std::string::npos) << error;
+}
+
+TEST(GlbReader, OnlyChildrenHangBelowANode) {
+  Glb glb;
+  glb.json["nodes"] = Json::array({{{"mesh", 0}, {"nodes", {1}}}, {{"mesh", 0}}});
+  EXPECT_EQ(read(glb).triangles.size(), 4u);
 }
 
 }  // namespace

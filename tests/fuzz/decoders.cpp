@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "common/base/assert.h"
+#include "common/image/image.h"
 #include "common/journal/session_journal.h"
 #include "common/lesson/course.h"
 #include "common/secure/datagram_channel.h"
@@ -29,6 +30,7 @@
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/dicom/dicom_reader.h"
+#include "server/organs/embed/embed.h"
 #include "server/organs/formats/mesh_file.h"
 #include "server/organs/formats/tetgen_reader.h"
 #include "server/organs/label_map/label_solid.h"
@@ -279,11 +281,19 @@ bool decode_reduction(BytesView bytes) {
 bool decode_local_reduction(BytesView bytes) {
   return decode_packed(bytes, organ::kLocalReductionMagic, 2, organ::unpack_local_reduction);
 }
+// The fine surface is valid. The block is large, so that surfaces of all sizes lie near its own.
+void embed_surface(const surface::RawSurface& raw, const std::string& name) {
+  static const auto kBlock = *catalogue::make_lattice({3, 3, 3, 0.5});
+  const auto fine = embed::embed(raw, kBlock.mesh, {.picture = raw.picture, .name = name});
+  if (checked(fine)) TROCAR_ASSERT(wire::validate(fine->surface).ok());
+}
 // Readers of mesh files, and what makes a valid mesh or a closed surface of what they read.
 bool make_solid(Result<formats::TetsOrSurface> read, const std::string& name) {
   if (!checked(read)) return false;
-  if (auto* raw = std::get_if<surface::RawSurface>(&*read))
+  if (auto* raw = std::get_if<surface::RawSurface>(&*read)) {
+    embed_surface(*raw, name);
     return checked(surface::check_surface(std::move(*raw), mesh::Unit::Metre, name));
+  }
   const auto mesh =
       mesh::make_mesh(std::get<mesh::RawTets>(std::move(*read)), mesh::Unit::Metre, name);
   TROCAR_ASSERT(!mesh.ok() || mesh::validate(mesh->mesh).ok());
@@ -296,6 +306,41 @@ bool decode_mesh(BytesView bytes) {
 constexpr char kGmsh[] = "a.msh", kVtk[] = "a.vtk", kVtu[] = "a.vtu", kMedit[] = "a.mesh",
                kAbaqus[] = "a.inp", kStl[] = "a.stl", kObj[] = "a.obj", kPly[] = "a.ply",
                kGlb[] = "a.glb";
+
+// Bytes without a file's magic are taken for its JSON and, behind a zero, its numbers: no fuzzer
+// keeps the lengths of both right.
+bool decode_glb(BytesView bytes) {
+  const auto text = text_of(bytes);
+  if (text.starts_with("glTF")) return decode_mesh<kGlb>(bytes);
+  const auto split = std::min(text.find('\0'), text.size());
+  const auto numbers = text.substr(std::min(split + 1, text.size()));
+  Bytes file;
+  const auto put = [&file](std::string_view part) {
+    const auto view = bytes_of(part);
+    file.insert(file.end(), view.begin(), view.end());
+  };
+  const auto put_number = [&put](std::size_t number) {
+    const auto value = static_cast<std::uint32_t>(number);
+    put({reinterpret_cast<const char*>(&value), sizeof value});
+  };
+  put("glTF");
+  put_number(2);
+  put_number(12 + 8 + split + 8 + numbers.size());
+  put_number(split);
+  put("JSON");
+  put(text.substr(0, split));
+  put_number(numbers.size());
+  put({"BIN\0", 4});
+  put(numbers);
+  return decode_mesh<kGlb>(file);
+}
+
+bool decode_image(BytesView bytes) {
+  const auto image = image::decode(text_of(bytes));
+  TROCAR_ASSERT(!image.ok() ||
+                image->pixels.size() == std::size_t(image->width) * std::size_t(image->height));
+  return checked(image);
+}
 
 bool decode_nifti(BytesView bytes) {
   auto map = label_map::parse_nifti(text_of(bytes), std::nullopt, "a.nii");
@@ -378,7 +423,8 @@ constexpr Decoder kDecoders[] = {
     {"stl", decode_mesh<kStl>},
     {"obj", decode_mesh<kObj>},
     {"ply", decode_mesh<kPly>},
-    {"glb", decode_mesh<kGlb>},
+    {"glb", decode_glb},
+    {"image", decode_image},
     {"nifti", decode_nifti},
     {"dicom", decode_dicom},
     {"script", decode_script},

@@ -69,6 +69,13 @@ TEST_F(FineSurfaceOnTheWay, EachPartComesAfterTheOneBeforeHasArrived) {
   expect_whole(client);
 }
 
+TEST_F(FineSurfaceOnTheWay, WhoHasNotJoinedIsSentNothingOfIt) {
+  RawClient client(session.port());
+  for (int i = 0; i < 3; ++i) session.publish(10);
+  ASSERT_TRUE(client.join("Anna", proto::ROLE_SURGEON));
+  expect_whole(client);
+}
+
 TEST_F(FineSurfaceOnTheWay, AConnectionThatCarriesGuestsIsSentItOnce) {
   session.publish(10);
   RawClient carrier(session.port());

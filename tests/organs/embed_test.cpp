@@ -79,6 +79,21 @@ TEST_F(Embed, ThePatientsAxesAreTurnedAsThoseOfALabelMap) {
   }
 }
 
+// A surface that is imported stays in the axes that it says.
+TEST_F(Embed, AxesThatDifferFromTheOrgansAreTurnedIntoThose) {
+  auto raw = raw_of(organ_.mesh, offset_);
+  const auto straight = embed(raw, organ_.mesh, options_of(offset_));
+  auto options = options_of(offset_);
+  options.organ_axes = options.axes = surface::Axes::Lps;
+  EXPECT_EQ(embed(raw, organ_.mesh, options)->surface, straight->surface);
+  options.axes = surface::Axes::Ras;
+  for (Vec3d& p : raw.positions) p = {-p.x, -p.y, p.z};
+  EXPECT_EQ(embed(raw, organ_.mesh, options)->surface, straight->surface);
+  options.axes = surface::Axes::LeftHeadFront;
+  for (Vec3d& p : raw.positions) p = {-p.x, p.z, p.y};
+  EXPECT_EQ(embed(raw, organ_.mesh, options)->surface, straight->surface);
+}
+
 TEST_F(Embed, OneThatLooksInwardIsTurned) {
   auto raw = raw_of(organ_.mesh, offset_);
   for (auto& t : raw.triangles) std::swap(t[0], t[1]);
@@ -98,8 +113,11 @@ TEST_F(Embed, OneThatIsElsewhereIsRefusedWithThePlace) {
   EXPECT_NE(fine.error().message.find("fine.obj: the vertex at "), std::string::npos);
   EXPECT_NE(fine.error().message.find("mm from the surface of the mesh, may be"),
             std::string::npos);
+  // The file's first faces have more corners than three.
+  for (auto& number : raw.face_numbers) number = 7;
   const auto other_unit = embed(raw, organ_.mesh, {.offset_m = offset_, .name = "fine.obj"});
   ASSERT_FALSE(other_unit.ok());
+  EXPECT_NE(other_unit.error().message.find("fine.obj: face 7: "), std::string::npos);
   EXPECT_NE(other_unit.error().message.find("same unit"), std::string::npos);
 }
 

@@ -53,6 +53,15 @@ TEST(Labels, AreChosenByNumberOrByName) {
   EXPECT_EQ(regions_of("Left kidney,4"), (Names{"Liver", "Left kidney"}));
 }
 
+TEST(Labels, MoreThanAnOrganMayHaveAreRefusedBeforeTheyAreMeshed) {
+  auto map = two_halves();
+  std::uint16_t next = 0;
+  for (auto& label : map.labels)
+    if (label != 0) label = ++next;
+  EXPECT_EQ(regions_of("", map),
+            (Names{"map.dcm: has 8000 labels, an organ may have 1000: choose some (--labels)"}));
+}
+
 TEST(Labels, WhatTheMapDoesNotHaveIsRefusedWithWhatItHas) {
   EXPECT_EQ(regions_of("Tumour"),
             (Names{"--labels: map.dcm has no label 'Tumour', it has 4:Liver, 7:Left kidney"}));

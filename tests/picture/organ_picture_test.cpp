@@ -50,6 +50,44 @@ TEST(OrganPicture, HeldNodesAreDarkerAndRegionsOfOtherColours) {
   EXPECT_EQ(scale_bar_m(mesh), 0.1);
 }
 
+// The square of the fine surface lies before the tetrahedron's back face and looks to the front;
+// all of a picture is painted on it.
+wire::FineSurface square() {
+  wire::FineSurface fine;
+  const int side = 160'000;
+  fine.quanta = {{-side, -side, 0}, {side, -side, 0}, {side, side, 0}, {-side, side, 0}};
+  fine.triangles = {{0, 1, 2}, {0, 2, 3}};
+  fine.texture = {{0, 0}, {32768, 0}, {32768, 32768}, {0, 32768}};
+  return fine;
+}
+
+TEST(OrganPicture, AFineSurfaceTakesTheMeshsPlaceWithItsPicture) {
+  const auto mesh = tetrahedron();
+  const image::Image painted{
+      2, 2, {{0, 200, 0, 255}, {0, 0, 200, 255}, {200, 0, 0, 255}, {200, 0, 0, 255}}};
+  const auto plain = draw_organ(mesh, {0, 0, 0, 0}, {0, 0, 0, 0}, square());
+  auto picture = draw_organ(mesh, {0, 0, 0, 0}, {0, 0, 0, 0}, square(), painted);
+  const int view = picture.width / 3;
+  const Colour ground{255, 255, 255};
+  const auto at = [view](Picture& of, int right, int up) {
+    return of.at(view / 2 + right, view / 2 - up);
+  };
+  const Colour left = at(picture, -40, 40), right = at(picture, 40, 40),
+               below = at(picture, -40, -40);
+  EXPECT_TRUE(left[0] == 0 && left[1] > 100 && left[2] == 0) << int(left[1]);
+  EXPECT_TRUE(right[0] == 0 && right[1] == 0 && right[2] > 100) << int(right[2]);
+  EXPECT_TRUE(below[0] > 100 && below[1] == 0 && below[2] == 0) << int(below[0]);
+  // The mesh has nothing there, and what it has elsewhere is not drawn.
+  EXPECT_EQ(at(picture, -170, 170), ground);
+  EXPECT_EQ(picture.at(view + view / 2 + 60, view / 2 + 100), ground) << "the square has no depth";
+  EXPECT_NE(plain.pixels, picture.pixels);
+  // Held nodes are dark and regions coloured, whatever is painted.
+  auto held = draw_organ(mesh, {0, 0, 0, 0}, {1, 1, 1, 1}, square(), painted);
+  EXPECT_LT(at(held, -40, 40)[1], left[1]);
+  auto region = draw_organ(mesh, {1, 1, 1, 1}, {0, 0, 0, 0}, square(), painted);
+  EXPECT_NE(at(region, -40, 40), left);
+}
+
 TEST(Png, HoldsTheRowsPacked) {
   const Picture picture{2, 2, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}};
   const std::string png = to_png(picture);

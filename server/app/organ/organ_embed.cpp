@@ -18,7 +18,7 @@ namespace {
 using surface::Axes;
 
 const char* name_of(Axes axes) {
-  return axes == Axes::Ras ? "RAS" : "LPS";
+  return axes == Axes::Ras ? "RAS" : axes == Axes::Lps ? "LPS" : "left, head and front";
 }
 
 // Reads the names of --embed-frame that are of a patient's axes.
@@ -27,25 +27,34 @@ Axes axes_of(const std::string& frame) {
 }
 
 // Sets axes and offset, and says where from they are; empty: they are those of the organ's file.
-std::string choose_frame(const EmbedCommand& command, const EmbedPlace& place,
-                         const surface::RawSurface& raw, embed::EmbedOptions& options) {
+Result<std::string> choose_frame(const EmbedCommand& command, const EmbedPlace& place,
+                                 const surface::RawSurface& raw, embed::EmbedOptions& options) {
   if (command.frame == "organ") {
     options.offset_m = {};
-    return "around the organ's centre, as --embed-frame says";
+    return std::string("around the organ's centre, as --embed-frame says");
   }
-  if (command.frame == "file") return "in its own axes, as --embed-frame says";
-  options.axes = axes_of(command.frame);
-  const bool is_said = options.axes != Axes::Unsaid;
-  // Meshes and surfaces are imported in the axes that they have, and so is what is embedded.
-  if (!is_said && place.axes != Axes::Unsaid)
-    options.axes = raw.axes == Axes::Unsaid ? place.axes : raw.axes;
-  if (options.axes == Axes::Unsaid) return {};
-  if (options.axes == Axes::LeftHeadFront)
-    return "x to the left, y to the head, z to the front, as glTF has them";
+  if (command.frame == "file") return std::string("in its own axes, as --embed-frame says");
+  const Axes said = axes_of(command.frame), own = said != Axes::Unsaid ? said : raw.axes;
+  options.axes = own != Axes::Unsaid ? own : place.axes;
+  options.organ_axes = place.organ_axes;
+  if (place.organ_axes == Axes::Unsaid && said != Axes::Unsaid) {
+    options.organ_axes = Axes::LeftHeadFront;
+  } else if (place.organ_axes == Axes::Unsaid) {
+    // Every glTF file has the axes of its format: those alone say nothing about the other file.
+    if (own == Axes::Unsaid || own == Axes::LeftHeadFront) return std::string();
+    return Error{ErrorCode::Usage,
+                 fmt::format("{}: says that its axes are {}, and {} does not say its own: with "
+                             "--embed-frame file they are the same",
+                             command.file, name_of(own), place.file)};
+  }
+  if (options.axes == options.organ_axes)
+    return std::string(options.axes == Axes::LeftHeadFront
+                           ? "x to the left, y to the head, z to the front, as glTF has them"
+                           : "");
   return fmt::format("turned from {}, as {}", name_of(options.axes),
-                     is_said                    ? "--embed-frame says"
-                     : raw.axes != Axes::Unsaid ? "the file says"
-                                                : "the label map is");
+                     said != Axes::Unsaid  ? "--embed-frame says"
+                     : own != Axes::Unsaid ? "the file says"
+                                           : "the label map is");
 }
 
 std::string unit_text(double unit_m) {
@@ -58,33 +67,32 @@ std::string unit_text(double unit_m) {
 }  // namespace
 
 void add_embed_options(CLI::App& app, EmbedCommand& command) {
-  app.add_option("--embed", command.file,
-                 "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
-                 ".obj, .ply or .glb, in the unit and place of FILE; at most 200,000 triangles")
-      ->type_name("FINE");
+  auto* embed = app.add_option(
+      "--embed", command.file,
+      "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
+      ".obj, .ply or .glb, in the unit and place of FILE; at most 200,000 triangles");
+  embed->type_name("FINE");
   app.add_option("--embed-picture", command.picture,
                  "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB "
                  "[that of a .glb]")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->needs(embed);
   app.add_option("--embed-frame", command.frame,
                  "its axes: file (as they are), ras or lps (a patient's, turned as a label map's), "
                  "organ (as export writes .glb); auto: what it says, or those of FILE")
       ->type_name("FRAME")
+      ->needs(embed)
       ->check(CLI::IsMember({"auto", "file", "ras", "lps", "organ"}))
       ->capture_default_str();
   app.add_option("--embed-unit", command.unit,
                  "length unit of the fine surface: m, cm or mm [.glb: m, else that of FILE]")
       ->type_name("UNIT")
+      ->needs(embed)
       ->check(CLI::IsMember({"m", "cm", "mm"}));
 }
 
 Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ::Organ& organ) {
-  if (command.file.empty()) {
-    if (!command.picture.empty())
-      return Error{ErrorCode::Usage,
-                   "--embed-picture: needs --embed, the surface it is painted on"};
-    return {};
-  }
+  if (command.file.empty()) return {};
   auto file = formats::read_mesh_file(command.file);
   if (!file) return file.error();
   const auto* raw = std::get_if<surface::RawSurface>(&*file);
@@ -100,9 +108,10 @@ Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ
     options.unit_m = mesh::metres_of(*unit);
   }
   const auto frame = choose_frame(command, place, *raw, options);
-  if (!frame.empty() || options.unit_m != place.unit_m)
+  if (!frame) return frame.error();
+  if (!frame->empty() || options.unit_m != place.unit_m)
     std::fprintf(stderr, "%s: %s: read in %s%s%s\n", kProgram, command.file.c_str(),
-                 unit_text(options.unit_m).c_str(), frame.empty() ? "" : ", ", frame.c_str());
+                 unit_text(options.unit_m).c_str(), frame->empty() ? "" : ", ", frame->c_str());
   if (!command.picture.empty()) {
     auto picture = formats::read_foreign_file(command.picture);
     if (!picture) return picture.error();

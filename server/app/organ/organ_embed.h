@@ -25,14 +25,17 @@ struct EmbedCommand {
 
 // It tells how the organ's file was read: a fine surface follows that.
 struct EmbedPlace {
-  double unit_m = 1;                           // of the file's numbers
-  surface::Axes axes = surface::Axes::Unsaid;  // of a label map: the patient's, else unsaid
+  std::string file;
+  double unit_m = 1;                                 // of the file's numbers
+  surface::Axes axes = surface::Axes::Unsaid;        // that it says
+  surface::Axes organ_axes = surface::Axes::Unsaid;  // into which it was turned, or the same
 };
 
 void add_embed_options(CLI::App& app, EmbedCommand& command);
 
 // Reads the files and gives the organ its fine surface, and says on stderr how it is placed and how
-// it fits. Nothing is done without a file.
+// it fits. Nothing is done without a file. Error: what embed() refuses; the file says axes
+// where the organ's does not.
 Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ::Organ& organ);
 
 }  // namespace trocar::app

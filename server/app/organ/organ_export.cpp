@@ -2,10 +2,13 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <utility>
 
 #include "common/base/text_file.h"
+#include "common/image/image.h"
 #include "common/wire/fine_surface.h"
 #include "server/app/organ/organ_print.h"
+#include "server/app/organ/program_name.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/formats/mesh_writer.h"
 #include "server/organs/picture/organ_picture.h"
@@ -51,6 +54,8 @@ Status run_export(const ExportCommand& command) {
   if (!has_tets && ending != ".stl" && ending != ".glb")
     return Error{ErrorCode::Usage,
                  "--out: " + command.out + ": the file must end with .msh, .vtu, .stl or .glb"};
+  if (ending == ".glb" && *unit != mesh::Unit::Metre)
+    return Error{ErrorCode::Usage, "--unit: " + command.out + ": .glb is in m"};
   const auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
   if (has_tets && organ->mesh.tets.empty())
@@ -76,7 +81,18 @@ Status run_export(const ExportCommand& command) {
 Status draw(const organ::Organ& organ, const std::string& path) {
   std::vector<std::uint8_t> is_held(organ.mesh.node_count(), 0);
   for (const NodeIndex node : organ.fixed_nodes) is_held[node.value] = 1;
-  const auto picture = picture::draw_organ(organ.mesh, organ::material_map(organ).nodes, is_held);
+  const auto& fine = organ.fine_surface;
+  image::Image painted;
+  if (!fine.picture.empty()) {
+    auto image = image::decode(fine.picture);
+    if (image)
+      painted = std::move(*image);
+    else
+      std::fprintf(stderr, "%s: warning: %s: the fine surface's %s\n", kProgram, organ.name.c_str(),
+                   image.error().message.c_str());
+  }
+  const auto picture =
+      picture::draw_organ(organ.mesh, organ::material_map(organ).nodes, is_held, fine, painted);
   if (auto status = write_text_file(path, picture::to_png(picture)); !status) return status;
   std::fprintf(stderr, "%s: seen from the front, the left and above; the bar is %.3g mm long\n",
                path.c_str(), 1e3 * picture::scale_bar_m(organ.mesh));

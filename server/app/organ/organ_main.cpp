@@ -302,7 +302,7 @@ Status run_import(const Options& options) {
   give_regions_its_material(imported->organ);
   if (auto changed = change_organ(options, true, imported->organ); !changed) return changed;
   give_regions_its_material(imported->organ);
-  EmbedPlace place{.unit_m = imported->unit_m};
+  EmbedPlace place{options.import_file, imported->unit_m, imported->axes, imported->axes};
   if (dicom::is_dicom(path))
     place.axes = surface::Axes::Lps;
   else if (label_map::is_nifti_file(path))

@@ -102,6 +102,10 @@ Result<mesh::ImportedMesh> fill_labels(label_map::LabelMap map, const std::strin
     for (const auto& [label, name] : *labels) numbers.push_back(label);
   const auto solid = label_map::LabelSolid::make(std::move(map), numbers, file);
   if (!solid) return solid.error();
+  if (solid->labels().size() > organ::kMaxRegions)
+    return Error{ErrorCode::BadFile,
+                 fmt::format("{}: has {} labels, an organ may have {}: choose some (--labels)",
+                             file, solid->labels().size(), organ::kMaxRegions)};
   auto filled = label_map::mesh_labels(*solid, *nodes, *labels, file);
   if (!filled) return filled.error();
   notes = std::move(filled->notes);
@@ -138,8 +142,7 @@ Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& op
 }
 
 Result<mesh::ImportedMesh> read_mesh(const std::filesystem::path& path,
-                                     const ImportOptions& options,
-                                     std::vector<std::string>& notes) {
+                                     const ImportOptions& options, ImportedOrgan& result) {
   const std::string name = path.string();
   if (!options.labels.empty())
     return Error{ErrorCode::Usage, name + ": --labels does not apply, the file is no label map"};
@@ -148,8 +151,10 @@ Result<mesh::ImportedMesh> read_mesh(const std::filesystem::path& path,
                                          formats::kMeshEndings + ", .nii, .nii.gz"};
   auto file = formats::read_mesh_file(path);
   if (!file) return file.error();
-  if (auto* surface = std::get_if<surface::RawSurface>(&*file))
-    return fill(std::move(*surface), options, name, notes);
+  if (auto* surface = std::get_if<surface::RawSurface>(&*file)) {
+    result.axes = surface->axes;
+    return fill(std::move(*surface), options, name, result.notes);
+  }
   if (options.nodes)
     return Error{ErrorCode::Usage, name + ": --nodes does not apply, the file has tetrahedra"};
   return mesh::make_mesh(std::get<mesh::RawTets>(std::move(*file)), options.unit, name);
@@ -252,6 +257,7 @@ Result<ImportedOrgan> import_labels(label_map::LabelMap map, const std::filesyst
                                     const ImportOptions& options) {
   ImportedOrgan result;
   result.unit_m = map.unit_m;
+  result.axes = surface::Axes::LeftHeadFront;
   auto imported = fill_labels(std::move(map), path.string(), options, result.notes);
   if (!imported) return imported.error();
   return make_organ(std::move(*imported), path, options, options.unit_is_said, std::move(result));
@@ -266,7 +272,7 @@ Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
   }
   ImportedOrgan result;
   result.unit_m = metres_of(options.unit);
-  auto imported = read_mesh(path, options, result.notes);
+  auto imported = read_mesh(path, options, result);
   if (!imported) return imported.error();
   return make_organ(std::move(*imported), path, options, true, std::move(result));
 }

@@ -16,6 +16,7 @@
 #include "server/organs/mesh/raw_tets.h"
 #include "server/organs/organ/fix_rule.h"
 #include "server/organs/organ/organ.h"
+#include "server/organs/surface/raw_surface.h"
 
 namespace trocar::catalogue {
 
@@ -36,7 +37,9 @@ struct ImportOptions {
 
 struct ImportedOrgan {
   organ::Organ organ;
-  double unit_m = 1;                  // of the file's numbers
+  double unit_m = 1;  // of the file's numbers
+  // Those of the organ: a label map is turned to left, head and front, a surface stays as it says.
+  surface::Axes axes = surface::Axes::Unsaid;
   std::vector<std::string> warnings;  // one line each: what was repaired
   std::vector<std::string> notes;     // one line each: how a surface was filled, regions, sets
 };

@@ -87,14 +87,18 @@ Status check_picture(const EmbedOptions& options) {
                                   width, height, wire::kMostFinePictureSide));
 }
 
-// To the patient's left, head and front.
-Vec3d turned(surface::Axes axes, const Vec3d& p) {
+// Turns from right, front and head or left, back and head to left, head and front, and back.
+Vec3d to_left_head_front(surface::Axes axes, const Vec3d& p) {
   if (axes == surface::Axes::Ras) return {-p.x, p.z, p.y};
   return axes == surface::Axes::Lps ? Vec3d{p.x, p.z, -p.y} : p;
 }
-Vec3d turned_back(surface::Axes axes, const Vec3d& p) {
+Vec3d from_left_head_front(surface::Axes axes, const Vec3d& p) {
   if (axes == surface::Axes::Ras) return {-p.x, p.z, p.y};
   return axes == surface::Axes::Lps ? Vec3d{p.x, -p.z, p.y} : p;
+}
+Vec3d turned(surface::Axes from, surface::Axes to, const Vec3d& p) {
+  const bool is_said = from != surface::Axes::Unsaid && to != surface::Axes::Unsaid;
+  return is_said ? from_left_head_front(to, to_left_head_front(from, p)) : p;
 }
 
 // Compares with the mesh: how far away, and which way it looks.
@@ -118,7 +122,7 @@ Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine&
     const auto in_file = [&](double c) {
       return std::round(c / options.unit_m * 1e6) / 1e6 + 0.0;  // no minus before zero
     };
-    const Vec3d place = turned_back(options.axes, worst + options.offset_m);
+    const Vec3d place = turned(options.organ_axes, options.axes, worst + options.offset_m);
     return bad(options,
                fmt::format("the vertex at {:.5g} {:.5g} {:.5g} is {:.2f} mm from the surface of "
                            "the mesh, may be {:.2f} mm, half of its mean edge: is it the same "
@@ -154,12 +158,13 @@ Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& 
   for (std::size_t i = 0; i < raw.triangles.size(); ++i) {
     std::array<Place, 3> places{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3d at = turned(options.axes, raw.positions[raw.triangles[i][k].value]);
+      const Vec3d at =
+          turned(options.axes, options.organ_axes, raw.positions[raw.triangles[i][k].value]);
       const Vec3d p = at * unit - options.offset_m;
       if (!is_finite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kFarthest_m)
-        return bad(options, fmt::format("triangle {}: a corner is more than 1.9 m from the organ's "
+        return bad(options, fmt::format("face {}: a corner is more than 1.9 m from the organ's "
                                         "centre: is it in the same unit?",
-                                        i + 1));
+                                        raw.face_numbers[i]));
       places[k] = wire::fine_quanta(p);
     }
     if (!(length(normal(metres(places[0]), metres(places[1]), metres(places[2]))) > 0)) {

@@ -24,9 +24,9 @@ inline constexpr double kMostEdgesAway = 0.5;  // of the mean edge of the mesh's
 
 struct EmbedOptions {
   double unit_m = 1;  // of the file's numbers
-  // Those of a patient are turned as label maps are: x to the left, y to the head, z to the front.
-  // Unsaid: the file's axes are the organ's.
-  surface::Axes axes = surface::Axes::Unsaid;
+  // Those of the file and of the organ, between which places are turned. Either is unsaid: they are
+  // the same.
+  surface::Axes axes = surface::Axes::Unsaid, organ_axes = surface::Axes::LeftHeadFront;
   Vec3d offset_m;       // of the organ's origin in the file's frame
   std::string picture;  // a PNG or JPEG file's bytes; empty: none
   std::string name;     // it starts each error, usually the file's path

@@ -16,12 +16,17 @@ namespace {
 
 constexpr std::size_t kHeader = 12, kChunkHeader = 8;
 constexpr std::size_t kMostJsonBytes = 4 * 1024 * 1024;
-constexpr std::size_t kMostNodes = 10'000;
-constexpr std::size_t kBytesPerTriangle = 200;  // that are built, with places in a picture
+constexpr std::size_t kMostNodes = 10'000, kMostPrimitives = 100'000;  // the latter of all nodes
+// Both are of what is built: a value of JSON, and a triangle with its places in a picture.
+constexpr std::size_t kBytesPerValue = 200, kBytesPerTriangle = 200;
 constexpr std::size_t kMostGrowth = 16, kSmallBytes = 16 * 1024 * 1024;
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr int kUInt8 = 5121, kUInt16 = 5123, kUInt32 = 5125, kFloat = 5126;
 constexpr int kTriangles = 4;
+
+// An object of this kind finds its keys by their order: one that keeps them as they come compares
+// each with all before it, and a file of 4 MiB would take minutes.
+using Json = nlohmann::json;
 
 // It says what is wrong, and leaves this file as an Error.
 struct GlbFault {
@@ -102,6 +107,8 @@ class GlbReader {
     return value;
   }
 
+  std::size_t most_built() const { return kMostGrowth * file_.size() + kSmallBytes; }
+
   void open() {
     if (file_.size() < kHeader + kChunkHeader || !file_.starts_with("glTF"))
       fail("is no glTF binary file");
@@ -122,6 +129,10 @@ class GlbReader {
       at += bytes;
     }
     if (json.size() > kMostJsonBytes) fail("its JSON has more than 4 MiB");
+    const auto values = static_cast<std::size_t>(
+        std::ranges::count_if(json, [](char c) { return c == ',' || c == '[' || c == '{'; }));
+    if (values * kBytesPerValue > most_built())
+      fail("its JSON of some " + std::to_string(values) + " values is far more than the file's");
     json_ = Json::parse(json, nullptr, false);
     if (!json_.is_object()) fail("its JSON is malformed");
     if (const Json* needed = member(json_, "extensionsRequired"); needed && !needed->empty())
@@ -161,14 +172,15 @@ class GlbReader {
   }
   // Fills `numbers`, as many as the file must give. False: there are none.
   template <std::size_t n>
-  static bool read_numbers(const Json& object, const char* key, std::array<double, n>& numbers) {
+  static bool read_numbers(const Json& object, const char* key, const std::string& of,
+                           std::array<double, n>& numbers) {
     const Json* list = member(object, key);
     if (list == nullptr) return false;
     if (!list->is_array() || list->size() != n)
-      fail(std::string(key) + " has not " + std::to_string(n) + " numbers");
+      fail(of + ": " + key + " has not " + std::to_string(n) + " numbers");
     for (std::size_t i = 0; i < n; ++i) {
       if (!(*list)[i].is_number() || !std::isfinite((*list)[i].template get<double>()))
-        fail(std::string(key) + " holds what is no finite number");
+        fail(of + ": " + key + " holds what is no finite number");
       numbers[i] = (*list)[i].template get<double>();
     }
     return true;
@@ -223,7 +235,7 @@ class GlbReader {
   void walk() {
     const Json& scene = element("scenes", find(json_, "scene").value_or(0));
     std::vector<std::pair<std::size_t, Motion>> waiting;
-    add_nodes(scene, Motion{}, waiting);
+    add_nodes(scene, "nodes", "scene", Motion{}, waiting);
     std::vector<bool> seen;
     std::size_t count = 0;
     while (!waiting.empty()) {
@@ -237,31 +249,30 @@ class GlbReader {
       seen[number] = true;
       if (member(node, "skin") != nullptr)
         fail(name + " has a skin: save it in the pose that is meant");
-      const Motion motion = above * motion_of(node);
+      const Motion motion = above * motion_of(node, name);
       if (const auto mesh = find(node, "mesh")) add_mesh(*mesh, motion);
-      add_nodes(node, motion, waiting);
+      add_nodes(node, "children", name, motion, waiting);
     }
   }
 
-  static void add_nodes(const Json& of, const Motion& motion,
+  static void add_nodes(const Json& of, const char* key, const std::string& name,
+                        const Motion& motion,
                         std::vector<std::pair<std::size_t, Motion>>& waiting) {
-    const char* key = member(of, "children") != nullptr ? "children" : "nodes";
     const Json* list = member(of, key);
     if (list == nullptr) return;
-    if (!list->is_array() || list->size() > kMostNodes)
-      fail(std::string(key) + " is no list of nodes");
+    if (!list->is_array()) fail(name + ": " + key + " is no list of nodes");
+    if (waiting.size() + list->size() > kMostNodes) fail("has more than 10,000 nodes");
     // From last to first, so that they are taken in the file's order.
     for (std::size_t i = list->size(); i-- > 0;) {
       const Json& number = (*list)[i];
-      if (!number.is_number_unsigned() || number.get<std::uint64_t>() > kMostNodes)
-        fail(std::string(key) + " holds what is no node's number");
+      if (!number.is_number_unsigned()) fail(name + ": " + key + " holds what is no node's number");
       waiting.emplace_back(number.get<std::size_t>(), motion);
     }
   }
 
-  static Motion motion_of(const Json& node) {
+  static Motion motion_of(const Json& node, const std::string& name) {
     Motion motion;
-    if (std::array<double, 16> m{}; read_numbers(node, "matrix", m)) {
+    if (std::array<double, 16> m{}; read_numbers(node, "matrix", name, m)) {
       for (std::size_t c = 0; c < 3; ++c)
         motion.columns[c] = {m[4 * c], m[4 * c + 1], m[4 * c + 2]};
       motion.origin = {m[12], m[13], m[14]};
@@ -269,11 +280,11 @@ class GlbReader {
     }
     std::array<double, 3> place{}, scale{1, 1, 1};
     std::array<double, 4> q{0, 0, 0, 1};
-    read_numbers(node, "translation", place);
-    read_numbers(node, "scale", scale);
-    read_numbers(node, "rotation", q);
+    read_numbers(node, "translation", name, place);
+    read_numbers(node, "scale", name, scale);
+    read_numbers(node, "rotation", name, q);
     const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(std::abs(norm - 1) < 1e-2)) fail("rotation is not of length 1");
+    if (!(std::abs(norm - 1) < 1e-2)) fail(name + ": rotation is not of length 1");
     const double x = q[0] / norm, y = q[1] / norm, z = q[2] / norm, w = q[3] / norm;
     motion.columns = {
         Vec3d{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)} * scale[0],
@@ -287,6 +298,8 @@ class GlbReader {
     const std::string name = "meshes[" + std::to_string(number) + "]";
     const Json* primitives = member(element("meshes", number), "primitives");
     if (primitives == nullptr || !primitives->is_array()) fail(name + " has no primitives");
+    primitives_ += primitives->size();
+    if (primitives_ > kMostPrimitives) fail("has more than 100,000 primitives in all of its nodes");
     for (std::size_t i = 0; i < primitives->size(); ++i) {
       const std::size_t mode = find((*primitives)[i], "mode").value_or(kTriangles);
       if (mode < kTriangles) continue;
@@ -309,7 +322,7 @@ class GlbReader {
     const std::size_t count = indices ? indices->count : places.count;
     if (count % 3 != 0) fail(name + " has " + std::to_string(count) + " corners, not three each");
     const std::size_t built = (corners_.size() + count) / 3 * kBytesPerTriangle;
-    if (built > kMostGrowth * file_.size() + kSmallBytes)
+    if (built > most_built())
       fail(name + ": the triangles of all nodes are far more than the file's");
     const auto texture = texture_of(primitive, *attributes, name);
     const bool is_mirrored = motion.is_mirrored();
@@ -377,6 +390,7 @@ class GlbReader {
   const std::string_view file_;
   std::string_view binary_;
   Json json_;
+  std::size_t primitives_ = 0;  // of the nodes so far
   std::vector<Vec3d> corners_;
   std::vector<std::array<std::array<double, 2>, 3>> texture_;
   std::optional<std::size_t> picture_;  // number of the image

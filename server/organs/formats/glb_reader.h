@@ -9,7 +9,7 @@
 //
 // Refused, in one line with the place in the file: strips and fans, skins, sparse accessors,
 // buffers outside the file, and what needs an extension. No more is built than 16 times the file's
-// size and 16 MiB.
+// size and 16 MiB, of the JSON as of the triangles; the JSON itself may have 4 MiB.
 //
 // Source: Khronos Group, glTF 2.0 specification, 2021 (ISO/IEC 12113), 3.5 to 3.9 and 4.
 

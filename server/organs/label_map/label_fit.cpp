@@ -10,7 +10,6 @@ namespace trocar::label_map {
 namespace {
 
 constexpr double kPieceShare = 0.01;
-constexpr double kVoxelsOverSurface = 1.5;  // area of a voxel surface over that of the true one
 
 // Visits the voxels whose centre lies in the tet.
 template <typename Visit>

@@ -19,10 +19,9 @@ namespace {
 
 constexpr double kGoodCount = 0.05, kAcceptableCount = 0.15;  // shares of the asked number
 constexpr int kAttempts = 6;
-constexpr double kFewer = 0.93;  // share of the lattice's nodes where a number gives no mesh
-constexpr double kStepsOverSurface = 1.5;  // area of the surface of voxels over the true one
-constexpr double kKeptInMesh = 0.8;        // share of a label's voxels below which the report warns
-constexpr double kMissedVolume = 0.05;     // share of a label's volume from which on it warns
+constexpr double kFewer = 0.93;         // share of the lattice's nodes where a number gives no mesh
+constexpr double kKeptInMesh = 0.8;     // share of a label's voxels below which the report warns
+constexpr double kMissedVolume = 0.05;  // share of a label's volume from which on it warns
 
 using Names = std::vector<std::pair<std::uint16_t, std::string>>;
 
@@ -77,7 +76,7 @@ std::vector<std::vector<NodeIndex>> settle_regions(const std::vector<std::uint16
 
 Result<Filled> fill(const LabelSolid& solid, int nodes) {
   auto filled = mesh::fill_field([&](const Vec3d& p) { return solid.distance(p); }, solid.box(),
-                                 solid.volume_m3(), solid.surface_m2() / kStepsOverSurface, nodes);
+                                 solid.volume_m3(), solid.surface_m2() / kVoxelsOverSurface, nodes);
   if (!filled) return filled.error();
   return Filled{std::move(filled->mesh), filled->spacing_m, {}, 0};
 }
@@ -89,27 +88,32 @@ Result<Filled> fill_with_interfaces(const LabelSolid& solid, int nodes) {
   double best_error = std::numeric_limits<double>::infinity();
   std::optional<Error> failure;
   int lattice_nodes = nodes;
+  const auto try_fewer = [&](const Error& error) {
+    failure = failure.value_or(error);
+    lattice_nodes = std::max(static_cast<int>(kFewer * lattice_nodes), mesh::kMinFillNodes);
+  };
   for (int i = 0; i < kAttempts; ++i) {
     auto filled =
         mesh::fill_field([&](const Vec3d& p) { return solid.distance(p); }, solid.box(),
-                         solid.volume_m3(), solid.surface_m2() / kStepsOverSurface, lattice_nodes);
+                         solid.volume_m3(), solid.surface_m2() / kVoxelsOverSurface, lattice_nodes);
     if (!filled) {
-      failure = failure.value_or(filled.error());
-      lattice_nodes = std::max(static_cast<int>(kFewer * lattice_nodes), mesh::kMinFillNodes);
+      try_fewer(filled.error());
       continue;
     }
     const double grown = filled->grown_m;
     auto conforming = mesh::conform_to_labels(
         filled->mesh, filled->spacing_m, [&](const Vec3d& p) { return field(p); },
         [&](const Vec3d& p) { return solid.distance(p) - grown; });
-    if (!conforming) return conforming.error();
+    if (!conforming) {
+      try_fewer({ErrorCode::BadFile,
+                 conforming.error().message + ": ask for another number of nodes (--nodes)"});
+      continue;
+    }
     const double volume = total_volume(conforming->mesh);
     if (std::abs(volume / solid.volume_m3() - 1) > mesh::kFillVolumeTolerance) {
-      failure =
-          Error{ErrorCode::BadFile,
-                "its interfaces change the volume by more than 1 %: ask for another number of "
-                "nodes (--nodes)"};
-      lattice_nodes = std::max(static_cast<int>(kFewer * lattice_nodes), mesh::kMinFillNodes);
+      try_fewer({ErrorCode::BadFile,
+                 "its interfaces change the volume by more than 1 %: ask for another number of "
+                 "nodes (--nodes)"});
       continue;
     }
     const double ratio = static_cast<double>(conforming->mesh.node_count()) / nodes;

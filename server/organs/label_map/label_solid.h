@@ -19,6 +19,8 @@
 
 namespace trocar::label_map {
 
+inline constexpr double kVoxelsOverSurface = 1.5;  // area of a voxel surface over the true one
+
 class LabelSolid {
  public:
   // labels: which belong to it; none: all but 0. Error: no voxel has one of them, or they are
@@ -33,7 +35,7 @@ class LabelSolid {
   mesh::Box box() const;  // around the solid
 
   double volume_m3() const { return volume_m3_; }
-  double surface_m2() const { return surface_m2_; }  // of the voxels, about 1.5 times the true one
+  double surface_m2() const { return surface_m2_; }  // of the voxels, kVoxelsOverSurface of it
   // Labels that the solid has, ascending, and the volume of each.
   const std::vector<std::uint16_t>& labels() const { return labels_; }
   double volume_of(std::uint16_t label) const;

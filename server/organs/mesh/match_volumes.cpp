@@ -9,7 +9,6 @@ namespace {
 
 constexpr int kMatchPasses = 6;
 constexpr double kMatchedVolume = 0.001;  // share of a label's
-constexpr int kMatchFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
 
 double volume_at(const TetStars& stars, const Tet& tet) {
   const Vec3d& o = stars.position(tet[0]);
@@ -34,7 +33,7 @@ std::vector<Triangle> interface_of(const TetMesh& mesh,
     if (tet_labels[t] == label)
       for (const NodeIndex node : mesh.tets[t]) is_at[node.value] = 1;
   for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-    for (const auto& [i, j, k] : kMatchFaces) {
+    for (const auto& [i, j, k] : kTetFaces) {
       const Tet& tet = mesh.tets[t];
       if (!is_at[tet[i].value] || !is_at[tet[j].value] || !is_at[tet[k].value]) continue;
       Face face{{tet[i], tet[j], tet[k]}, tet_labels[t] == label, {tet[i], tet[j], tet[k]}};

@@ -6,8 +6,6 @@
 namespace trocar::mesh {
 namespace {
 
-constexpr int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-
 // Disjoint sets; the smallest member represents its set, so numbering follows the members' order.
 class Sets {
  public:
@@ -73,7 +71,7 @@ Pieces find_pieces(const TetMesh& mesh) {
   std::vector<Face> faces;
   faces.reserve(mesh.tets.size() * 4);
   for (std::uint32_t t = 0; t < mesh.tets.size(); ++t)
-    for (const auto& [i, j, k] : kFaces) {
+    for (const auto& [i, j, k] : kTetFaces) {
       Face face{{mesh.tets[t][i], mesh.tets[t][j], mesh.tets[t][k]}, t};
       std::sort(face.key.begin(), face.key.end());
       faces.push_back(face);

@@ -9,8 +9,6 @@
 namespace trocar::mesh {
 namespace {
 
-// Faces of a positive tet, each counter-clockwise seen from outside.
-constexpr int kTetFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
 constexpr int kTetEdges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 NodePair ordered_pair(NodeIndex a, NodeIndex b) {

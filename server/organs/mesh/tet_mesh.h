@@ -31,6 +31,9 @@ using Tet = std::array<NodeIndex, 4>;       // positive volume: (b-a) x (c-a) . 
 using NodePair = std::array<NodeIndex, 2>;  // a < b
 using Triangle = std::array<NodeIndex, 3>;  // counter-clockwise seen from outside
 
+// Corners of a tet's faces, each counter-clockwise seen from outside.
+inline constexpr int kTetFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
 struct TetMesh {
   std::vector<Vec3d> rest_positions;  // m, world frame, node_count
   std::vector<Tet> tets;

@@ -9,8 +9,6 @@
 namespace trocar::mesh {
 namespace {
 
-constexpr int kFacesOfStar[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-
 bool has_node(const Tet& tet, NodeIndex node) {
   return tet[0] == node || tet[1] == node || tet[2] == node || tet[3] == node;
 }
@@ -29,7 +27,7 @@ TetStars::TetStars(std::vector<Vec3d> positions, std::vector<Tet> tets)
   faces.reserve(4 * tets_.size());
   for (std::uint32_t t = 0; t < tets_.size(); ++t) {
     for (const NodeIndex node : tets_[t]) stars_[node.value].push_back(t);
-    for (const auto& [i, j, k] : kFacesOfStar) {
+    for (const auto& [i, j, k] : kTetFaces) {
       std::array<NodeIndex, 3> face{tets_[t][i], tets_[t][j], tets_[t][k]};
       std::sort(face.begin(), face.end());
       faces.push_back(face);
@@ -82,7 +80,7 @@ bool TetStars::is_within(const Tet& tet, NodeIndex moved, const Vec3d& to,
   if (!(dot(cross(p[1] - p[0], p[2] - p[0]), p[3] - p[0]) > 0)) return false;
   std::array<Vec3d, 4> normals;
   for (std::size_t f = 0; f < 4; ++f) {
-    const auto& [i, j, k] = kFacesOfStar[f];
+    const auto& [i, j, k] = kTetFaces[f];
     const Vec3d normal = cross(p[j] - p[i], p[k] - p[i]);
     const double size = length(normal);
     if (!(size > 0)) return false;

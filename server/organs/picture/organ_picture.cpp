@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/math/vec3.h"
+#include "server/organs/surface/triangle_tree.h"
 
 namespace trocar::picture {
 namespace {
@@ -25,6 +26,14 @@ constexpr View kViews[] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                            {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}},
                            {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}};
 
+// One triangle as it is drawn.
+struct Face {
+  Vec3d corners[3];  // m
+  std::uint16_t region = 0;
+  bool is_held = false, has_edges = true;
+  const std::array<std::int32_t, 2>* texture[3] = {};  // places in the picture; null: none
+};
+
 double largest_half(const mesh::TetMesh& mesh) {
   double half = 0;
   for (const Vec3d& p : mesh.rest_positions)
@@ -42,8 +51,8 @@ Colour shaded(const Colour& colour, double light) {
 class Drawer {
  public:
   Drawer(const mesh::TetMesh& mesh, const std::vector<std::uint16_t>& regions,
-         const std::vector<std::uint8_t>& held)
-      : mesh_(mesh), regions_(regions), held_(held) {
+         const std::vector<std::uint8_t>& held, const image::Image& painted)
+      : mesh_(mesh), regions_(regions), held_(held), painted_(painted) {
     picture_.width = 3 * kView;
     picture_.height = kView + 2 * kMargin;
     const auto pixels =
@@ -53,9 +62,11 @@ class Drawer {
     pixels_per_m_ = (kView / 2 - kMargin) / largest_half(mesh);
   }
 
-  Picture run() {
-    for (int v = 0; v < 3; ++v)
-      for (const auto& triangle : mesh_.boundary_triangles) draw(kViews[v], v * kView, triangle);
+  Picture run(const wire::FineSurface& fine) {
+    if (fine.empty())
+      for (const auto& triangle : mesh_.boundary_triangles) draw(face_of(triangle));
+    else
+      draw(fine);
     const int length = static_cast<int>(scale_bar_m(mesh_) * pixels_per_m_);
     for (int y = 0; y < kBarHeight; ++y)
       for (int x = 0; x < length; ++x)
@@ -64,19 +75,68 @@ class Drawer {
   }
 
  private:
-  void draw(const View& view, int left, const mesh::Triangle& triangle) {
-    double x[3], y[3], z[3];
-    bool is_held = true;
-    std::uint16_t region = std::numeric_limits<std::uint16_t>::max();
-    Vec3d p[3];
+  Face face_of(const mesh::Triangle& triangle) const {
+    Face face{.region = std::numeric_limits<std::uint16_t>::max(), .is_held = true};
     for (std::size_t i = 0; i < 3; ++i) {
       const auto node = triangle[i].value;
-      p[i] = mesh_.rest_positions[node];
+      face.corners[i] = mesh_.rest_positions[node];
+      face.is_held = face.is_held && held_[node] != 0;
+      face.region = std::min(face.region, regions_[node]);
+    }
+    return face;
+  }
+
+  void draw(const wire::FineSurface& fine) {
+    const surface::TriangleTree tree(mesh_.rest_positions, mesh_.boundary_triangles);
+    for (const auto& triangle : fine.triangles) {
+      Vec3d corners[3], middle;
+      for (std::size_t i = 0; i < 3; ++i) {
+        corners[i] = to_double(fine.position_m(triangle[i]));
+        middle += corners[i] / 3;
+      }
+      Face face = face_of(mesh_.boundary_triangles[tree.nearest(middle).triangle]);
+      face.has_edges = false;
+      for (std::size_t i = 0; i < 3; ++i) {
+        face.corners[i] = corners[i];
+        if (!fine.texture.empty() && !painted_.pixels.empty())
+          face.texture[i] = &fine.texture[triangle[i]];
+      }
+      draw(face);
+    }
+  }
+
+  void draw(const Face& face) {
+    for (int v = 0; v < 3; ++v) draw(kViews[v], v * kView, face);
+  }
+
+  // The colour at a place of the face, by the weights of its corners.
+  Colour colour_at(const Face& face, const double (&weight)[3]) const {
+    const Colour own = kRegionColours[face.region % std::size(kRegionColours)];
+    if (face.texture[0] == nullptr) return own;
+    double place[2] = {};
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t k = 0; k < 2; ++k)
+        place[k] += weight[i] * (*face.texture[i])[k] * wire::kTextureQuantum;
+    // The picture is repeated beyond its edges; v runs upward.
+    const auto pixel = [](double share, int count) {
+      return std::clamp(static_cast<int>((share - std::floor(share)) * count), 0, count - 1);
+    };
+    const auto& painted =
+        painted_.at(pixel(place[0], painted_.width), pixel(1 - place[1], painted_.height));
+    Colour colour;
+    for (std::size_t i = 0; i < 3; ++i)
+      colour[i] =
+          face.region == 0 ? painted[i] : static_cast<std::uint8_t>((painted[i] + own[i]) / 2);
+    return colour;
+  }
+
+  void draw(const View& view, int left, const Face& face) {
+    double x[3], y[3], z[3];
+    const auto& p = face.corners;
+    for (std::size_t i = 0; i < 3; ++i) {
       x[i] = left + kView / 2.0 + dot(p[i], view.right) * pixels_per_m_;
       y[i] = kView / 2.0 - dot(p[i], view.up) * pixels_per_m_;
       z[i] = dot(p[i], view.toward);
-      is_held = is_held && held_[node] != 0;
-      region = std::min(region, regions_[node]);
     }
     const Vec3d normal = normalized(cross(p[1] - p[0], p[2] - p[0]), {});
     const double facing = dot(normal, view.toward);
@@ -85,8 +145,7 @@ class Drawer {
     if (area == 0) return;
     // Light comes from the eye and a little from above.
     const double light = (0.35 + 0.55 * facing + 0.1 * std::max(dot(normal, view.up), 0.0)) *
-                         (is_held ? kHeldShade : 1);
-    const Colour colour = shaded(kRegionColours[region % std::size(kRegionColours)], light);
+                         (face.is_held ? kHeldShade : 1);
     const auto clamp_to = [](double value, int low, int high) {
       return std::clamp(static_cast<int>(std::floor(value)), low, high);
     };
@@ -111,13 +170,15 @@ class Drawer {
                         static_cast<std::size_t>(column);
         if (depth <= depth_[at]) continue;
         depth_[at] = depth;
-        picture_.pixels[at] = least < kEdgePixels ? shaded(colour, kEdgeShade) : colour;
+        const bool is_edge = face.has_edges && least < kEdgePixels;
+        picture_.pixels[at] = shaded(colour_at(face, weight), is_edge ? light * kEdgeShade : light);
       }
   }
 
   const mesh::TetMesh& mesh_;
   const std::vector<std::uint16_t>& regions_;
   const std::vector<std::uint8_t>& held_;
+  const image::Image& painted_;
   Picture picture_;
   std::vector<double> depth_;  // m, towards the eye
   double pixels_per_m_ = 1;
@@ -126,8 +187,9 @@ class Drawer {
 }  // namespace
 
 Picture draw_organ(const mesh::TetMesh& mesh, const std::vector<std::uint16_t>& region_of_node,
-                   const std::vector<std::uint8_t>& is_held) {
-  return Drawer(mesh, region_of_node, is_held).run();
+                   const std::vector<std::uint8_t>& is_held, const wire::FineSurface& fine,
+                   const image::Image& painted) {
+  return Drawer(mesh, region_of_node, is_held, painted).run(fine);
 }
 
 double scale_bar_m(const mesh::TetMesh& mesh) {
