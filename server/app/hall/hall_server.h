@@ -26,7 +26,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/hall/bus/proof.h"
+#include "server/hall/proof/proof.h"
 #include "server/hall/sessions/sessions.h"
 
 namespace trocar::app {
