@@ -6,7 +6,9 @@
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "server/app/config/config_file.h"
+#include "server/app/config/nats_options.h"
 #include "server/app/config/place.h"
+#include "server/broadcast/subjects.h"
 
 namespace trocar::app {
 namespace {
@@ -23,11 +25,15 @@ Examples:
       who watches uses the relay as if it were the server
   trocar-relay --to 10.0.0.5:7690 --code CODE --certificate relay.crt --key relay.key --also b:7695
       one of two relays with one certificate, so that one code and one link is good for both
+  trocar-relay --to 10.0.0.5:7690 --code CODE --nats nats://10.0.0.2:4222 --publish monday
+      a relay that passes the session on over NATS, too
+  trocar-relay --from-nats monday --nats nats://10.0.0.2:4222 --code CODE --port 7695
+      one of many relays that take it from there: the server sends nothing more for them
   trocar-relay --config relay.toml --check-config
       are these options fine? deploy/trocar-relay.toml.example has all of them
 
 Exit codes: 0 ok, also when the session has ended, 2 command line, 3 bad file, 4 refused by the
-server, 5 port taken or no server.
+server, 5 port taken, no server, or nobody who publishes.
 )";
 constexpr std::size_t kMostNameBytes = 29;  // a number may follow
 constexpr std::size_t kMostFurther = 8;
@@ -42,6 +48,15 @@ CLI::Validator short_name() {
           ""};
 }
 
+CLI::Validator session_name() {
+  return {[](std::string& text) -> std::string {
+            return broadcast::is_session_name(text)
+                       ? ""
+                       : "is not a name of 1 to 64 letters, digits, hyphens and underscores";
+          },
+          ""};
+}
+
 class CommandLine {
  public:
   CommandLine();
@@ -51,9 +66,12 @@ class CommandLine {
   // Checks one option alone, as if nothing else had been given.
   Status check(const std::string& key, const std::string& text);
   Status finish();
+  // After finish(): options that need each other.
+  Status check_together();
 
  private:
   void add_access_options();
+  void add_nats_options();
   Status read_server();
   Status read_further();
 
@@ -126,7 +144,22 @@ CommandLine::CommandLine() {
                 "check all options as a start would, and exit with 0 or 2")
       ->needs(config)
       ->configurable(false);
+  add_nats_options();
   add_access_options();
+}
+
+void CommandLine::add_nats_options() {
+  auto* nats = app_.add_option_group("NATS", "one relay for all the others");
+  app::add_nats_options(*nats, options_.nats, "reach relays of this session over this NATS [no]");
+  nats->add_option("--publish", options_.publish,
+                   "pass the session on over NATS under this name, too [no]")
+      ->type_name("SESSION")
+      ->check(session_name());
+  nats->add_option("--from-nats", options_.from_nats,
+                   "take the session of this name from NATS instead of from its server; --code, or "
+                   "the link of --to, says which code watchers need [no]")
+      ->type_name("SESSION")
+      ->check(session_name());
 }
 
 void CommandLine::add_access_options() {
@@ -181,6 +214,23 @@ Status CommandLine::read_further() {
   return {};
 }
 
+Status CommandLine::check_together() {
+  const auto &publish = options_.publish, &from = options_.from_nats;
+  if (!publish.empty() && !from.empty())
+    return Error{ErrorCode::Usage, "--publish: a session --from-nats is published already"};
+  if (options_.nats.url.empty()) {
+    if (!publish.empty()) return Error{ErrorCode::Usage, "--publish: needs --nats URL"};
+    if (!from.empty()) return Error{ErrorCode::Usage, "--from-nats: needs --nats URL"};
+    return {};
+  }
+  if (publish.empty() && from.empty())
+    return Error{ErrorCode::Usage, "--nats: needs --publish or --from-nats"};
+  if (!from.empty() && !options_.code)
+    return Error{ErrorCode::Usage,
+                 "--code: --from-nats needs an observer's join code of the session, for watchers"};
+  return bus::check_place(options_.nats);
+}
+
 Status CommandLine::finish() {
   if (auto s = read_server(); !s) return s;
   if (auto s = read_further(); !s) return s;
@@ -210,8 +260,9 @@ Result<std::optional<RelayOptions>> parse_relay_command_line(int argc, char** ar
       parse_with_config(line.app(), argc, argv, check, options.origins, kExampleFile);
   if (!parsed) return parsed.error();
   if (!*parsed) return std::optional<RelayOptions>();
-  if (const auto finished = line.finish(); !finished)
-    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
+  auto finished = line.finish();
+  if (finished) finished = line.check_together();
+  if (!finished) return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
   options.config_file = config_file_of(line.app());
   return std::optional(std::move(options));
 }
