@@ -31,14 +31,21 @@ struct FakeBus {
   std::deque<Letter> letters;
   std::vector<Listener> listeners;
   std::set<std::string> lost_subjects;  // nothing of these arrives
+  std::set<std::string> late_subjects;  // what is sent to these arrives when nothing else is left
   std::size_t most_bytes = 1024 * 1024, waiting_bytes = 0;
   std::size_t sent_bytes = 0;
 
   // Delivers everything, also what is sent meanwhile.
   void deliver() {
-    while (!letters.empty()) {
-      const auto letter = std::move(letters.front());
-      letters.pop_front();
+    std::deque<Letter> late;
+    while (!letters.empty() || !late.empty()) {
+      auto& next = letters.empty() ? late : letters;
+      auto letter = std::move(next.front());
+      next.pop_front();
+      if (&next == &letters && late_subjects.contains(letter.subject)) {
+        late.push_back(std::move(letter));
+        continue;
+      }
       if (lost_subjects.contains(letter.subject)) continue;
       for (std::size_t i = 0; i < listeners.size(); ++i)
         if (listeners[i].subject == letter.subject && listeners[i].owner != letter.sender)
@@ -59,6 +66,7 @@ class FakeChannel final : public Channel {
     return {};
   }
   void send(const std::string& subject, Bytes bytes, const std::string& answer_to) override {
+    if (bytes.size() > bus_.most_bytes) return;
     bus_.sent_bytes += bytes.size();
     bus_.letters.push_back({this, subject, std::move(bytes), answer_to});
   }

@@ -101,7 +101,7 @@ std::string to_exposition(const relay::RelayFigures& figures) {
   text.gauge("connected", "1 while the relay is in the session.", number(figures.is_connected));
   text.counter("returns_total", "Times that it has come back to the server.",
                number(figures.returns));
-  text.counter("server_received_bytes_total", "Bytes from the server.",
+  text.counter("server_received_bytes_total", "Bytes from the server, or from NATS.",
                number(figures.server_bytes));
   text.gauge("watchers", "People who watch through it.", number(figures.watchers));
   text.gauge("connections", "Connections now.", number(figures.connections));
