@@ -181,6 +181,8 @@ void Publisher::take_stream(BytesView bytes) {
   if (!piece || piece->publisher == id_) return;
   if (was_active_ && piece->publisher > id_) return;
   other_ns_ = options_.clock_ns();
+  if (!std::exchange(is_waiting_, true))
+    log::info("another relay publishes the session as {}: waits for its end", options_.session);
   was_active_ = false;
 }
 
@@ -250,14 +252,15 @@ void Publisher::report() {
 
 void Publisher::attend() {
   if (channel_->most_bytes() == 0) other_ns_ = options_.clock_ns();  // another may be there first
-  const bool active = is_active();
-  if (active != was_active_)
-    log::info("{}", active ? "publishes the session as " + options_.session
-                           : "no longer publishes the session as " + options_.session);
-  was_active_ = active;
-  if (active)
+  const bool was_active = std::exchange(was_active_, is_active());
+  if (was_active && !was_active_)
+    log::info("publishes nothing as {}: the server or NATS is gone", options_.session);
+  if (!was_active && was_active_) log::info("publishes the session as {}", options_.session);
+  if (was_active_) {
+    is_waiting_ = false;
     channel_->send(subjects_.stream,
                    write_piece({.publisher = id_, .number = number_, .bytes = {}}));
+  }
   report();
 }
 

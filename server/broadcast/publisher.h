@@ -102,13 +102,14 @@ class Publisher final : public relay::Upstream {
   pacing::Allowance answers_;  // to those who ask for all
   relay::UpstreamEvents events_;
   std::unique_ptr<bridge::SessionCopy> copy_;
-  wire::SharedBytes welcome_;        // null: not yet
-  std::uint64_t number_ = 0;         // of the newest that went out
-  std::optional<Frame> published_;   // on which the next difference is based; empty: a keyframe
-  Bytes answer_;                     // to who asks for all; empty: not made
-  std::uint64_t answer_number_ = 0;  // of answer_
-  std::uint64_t other_ns_ = 0;       // when another publisher was heard
-  bool was_active_ = false;
+  wire::SharedBytes welcome_;            // null: not yet
+  std::uint64_t number_ = 0;             // of the newest that went out
+  std::optional<Frame> published_;       // on which the next difference is based; empty: a keyframe
+  Bytes answer_;                         // to who asks for all; empty: not made
+  std::uint64_t answer_number_ = 0;      // of answer_
+  std::uint64_t other_ns_ = 0;           // when another publisher was heard
+  bool was_active_ = false;              // as attend() has found it
+  bool is_waiting_ = false;              // for another publisher, and the log says so
   std::map<std::string, Taker> takers_;  // by the subject for answers to them
   std::optional<std::uint32_t> own_watchers_, reported_;
   std::uint64_t reported_ns_ = 0;

@@ -138,7 +138,8 @@ struct Bus::Parts {
   natsStatus hear(Heard& one) const;
   // Takes `made` for the connection from now on, and hears on it what was heard before.
   Status use(natsConnection* made);
-  void drop();
+  // Lets the connection go; false: there was none.
+  bool drop();
   void keep(const std::stop_token& stop);
   static void hand_on(natsConnection*, natsSubscription*, natsMsg* message, void* closure);
   static void note_closed(natsConnection* closed, void* closure);
@@ -188,7 +189,7 @@ Status Bus::Parts::use(natsConnection* made) {
   return {};
 }
 
-void Bus::Parts::drop() {
+bool Bus::Parts::drop() {
   std::vector<natsSubscription*> subscriptions;
   natsConnection* dropped = nullptr;
   {
@@ -199,6 +200,7 @@ void Bus::Parts::drop() {
   }
   for (auto* subscription : subscriptions) natsSubscription_Destroy(subscription);
   natsConnection_Destroy(dropped);
+  return dropped != nullptr;
 }
 
 void Bus::Parts::hand_on(natsConnection*, natsSubscription*, natsMsg* message, void* closure) {
@@ -239,7 +241,7 @@ void Bus::Parts::keep(const std::stop_token& stop) {
       if (!has_changed.wait(guard, stop, [this] { return is_gone; })) return;
       is_gone = false;
     }
-    drop();
+    if (drop()) log::info("NATS at {} has ended the connection", place.url);
     natsConnection* made = nullptr;
     auto opened = open(made);
     if (opened) opened = use(made);
