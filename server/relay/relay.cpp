@@ -21,27 +21,26 @@ constexpr std::size_t kSurfacesInOutbox = 8;  // as the server has it
 
 }  // namespace
 
-Relay::Relay(asio::io_context& context, RelayOptions options, RelayEvents events)
+Relay::Relay(asio::io_context& context, std::unique_ptr<Upstream> upstream, RelayOptions options,
+             RelayEvents events)
     : context_(context),
       options_(std::move(options)),
       events_(std::move(events)),
-      uplink_(
-          context.get_executor(), options_.uplink,
-          {.welcome = [this](const auto& welcome) { take_welcome(welcome); },
-           .message = [this](const auto& message,
-                             const auto& framed) { return take(message, framed); },
-           .lost =
-               [this](const std::string&) {
-                 if (crowd_) crowd_->note_lost();
-               },
-           .over = [this](EndReason reason, const std::string& text) { note_over(reason, text); }}),
+      upstream_(std::move(upstream)),
       attention_(context),
       end_timer_(context) {}
 
 Relay::~Relay() = default;
 
 void Relay::start() {
-  uplink_.start();
+  upstream_->start(
+      {.welcome = [this](const auto& welcome) { take_welcome(welcome); },
+       .message = [this](const auto& message, const auto& framed) { return take(message, framed); },
+       .lost =
+           [this](const std::string&) {
+             if (crowd_) crowd_->note_lost();
+           },
+       .over = [this](EndReason reason, const std::string& text) { note_over(reason, text); }});
 }
 
 // ---- from the server ----
@@ -50,7 +49,7 @@ void Relay::take_welcome(const proto::Welcome& welcome) {
   welcome_ = std::make_unique<proto::Welcome>(welcome);
   early_.clear();
   if (crowd_) crowd_->begin(welcome);
-  log::info("{} the session at {}", crowd_ ? "back in" : "in", options_.uplink.server.name);
+  log::info("{} the session at {}", crowd_ ? "back in" : "in", upstream_->name());
 }
 
 Status Relay::take(const proto::Envelope& message, const wire::SharedBytes& framed) {
@@ -107,12 +106,12 @@ Status Relay::open(std::size_t topology_bytes) {
   tcp_ = std::move(*listening);
   connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
   CrowdOptions crowd;
-  crowd.secret = options_.uplink.code.secret;
+  crowd.secret = options_.secret;
   crowd.most_watchers = options_.most_watchers;
   crowd.has_datagrams = tcp_->has_datagrams();
   crowd.further_addresses = options_.further_addresses;
-  crowd.say_up = [this](const proto::Envelope& message) { uplink_.say(message); };
-  crowd.server_time_us = [this](std::uint64_t now_us) { return uplink_.server_time_us(now_us); };
+  crowd.say_up = [this](const proto::Envelope& message) { upstream_->say(message); };
+  crowd.server_time_us = [this](std::uint64_t now_us) { return upstream_->server_time_us(now_us); };
   crowd_ = std::make_unique<Crowd>(*connections_, std::move(crowd));
   connections_->set_handler(*crowd_);
   return {};
@@ -135,10 +134,10 @@ void Relay::attend() {
 }
 
 RelayFigures Relay::figures() const {
-  RelayFigures figures{.is_connected = uplink_.is_welcome(),
+  RelayFigures figures{.is_connected = upstream_->is_welcome(),
                        .is_ready = is_listening_,
-                       .returns = uplink_.returns(),
-                       .server_bytes = uplink_.bytes_received()};
+                       .returns = upstream_->returns(),
+                       .server_bytes = upstream_->bytes_received()};
   if (!crowd_) return figures;
   figures.watchers = crowd_->watcher_count();
   figures.connections = tcp_->connection_count();
@@ -154,7 +153,7 @@ RelayFigures Relay::figures() const {
 void Relay::end(EndReason reason, const std::string& text) {
   if (std::exchange(is_ending_, true)) return;
   attention_.cancel();
-  uplink_.stop();
+  upstream_->stop();
   if (tcp_) tcp_->stop_accepting();
   if (crowd_) {
     const auto& counters = crowd_->counters();

@@ -1,6 +1,6 @@
 #pragma once
 
-// A relay as a whole: the uplink, a listener, and the crowd between them. The port is bound when
+// A relay as a whole: its upstream, a listener, and the crowd between them. The port is bound when
 // the first surface has come, as outboxes are made for its size; watchers are let in from the first
 // picture on. It ends with the session. Thread: that of the I/O context.
 
@@ -15,16 +15,17 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/secure/join_code.h"
 #include "common/wire/framing.h"
 #include "server/relay/crowd.h"
-#include "server/relay/uplink.h"
+#include "server/relay/upstream.h"
 #include "server/session/guests/guest_connections.h"
 #include "server/session/net/tcp_server.h"
 
 namespace trocar::relay {
 
 struct RelayOptions {
-  UplinkOptions uplink;
+  secure::HalfCode secret{};  // of the code that watchers need
   net::TcpServerOptions tcp;  // address, port, TLS; bounds are set by the number of watchers
   std::size_t most_watchers = 1000;
   std::vector<std::string> further_addresses;
@@ -49,7 +50,8 @@ struct RelayFigures {
 
 class Relay {
  public:
-  Relay(asio::io_context& context, RelayOptions options, RelayEvents events);
+  Relay(asio::io_context& context, std::unique_ptr<Upstream> upstream, RelayOptions options,
+        RelayEvents events);
   ~Relay();
 
   void start();
@@ -71,7 +73,7 @@ class Relay {
   asio::io_context& context_;
   const RelayOptions options_;
   const RelayEvents events_;
-  Uplink uplink_;
+  const std::unique_ptr<Upstream> upstream_;
   asio::steady_timer attention_, end_timer_;
   std::chrono::milliseconds waited_{0};
   std::unique_ptr<proto::Welcome> welcome_;

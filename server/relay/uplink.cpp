@@ -27,10 +27,9 @@ std::uint64_t ns_of(std::chrono::milliseconds time) {
 
 }  // namespace
 
-Uplink::Uplink(asio::any_io_executor executor, UplinkOptions options, UplinkEvents events)
+Uplink::Uplink(asio::any_io_executor executor, UplinkOptions options)
     : executor_(std::move(executor)),
       options_(std::move(options)),
-      events_(std::move(events)),
       bridge_({options_.server}),
       pause_(executor_),
       has_mail_(executor_, kNever),
@@ -39,7 +38,8 @@ Uplink::Uplink(asio::any_io_executor executor, UplinkOptions options, UplinkEven
 
 Uplink::~Uplink() = default;
 
-void Uplink::start() {
+void Uplink::start(UpstreamEvents events) {
+  events_ = std::move(events);
   deadline_ns_ = monotonic_ns() + ns_of(options_.reach_deadline);
   asio::co_spawn(executor_, run(), [](std::exception_ptr failure) { rethrow(failure); });
 }
@@ -70,7 +70,7 @@ void Uplink::cut() {
   next_ping_.cancel();
 }
 
-std::string Uplink::name() const {
+std::string Uplink::name_there() const {
   return number_ == 1 ? options_.name : options_.name + " " + std::to_string(number_);
 }
 
@@ -136,7 +136,7 @@ void Uplink::say_hello() {
   auto& hello = *envelope.mutable_hello();
   hello.set_protocol_major(kProtocolMajor);
   hello.set_protocol_minor(kProtocolMinor);
-  hello.set_name(name());
+  hello.set_name(name_there());
   hello.set_role(proto::ROLE_OBSERVER);
   hello.set_join_secret(options_.code.secret.data(), options_.code.secret.size());
   hello.set_acks_every_frame(true);

@@ -18,12 +18,12 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <string>
 
 #include "common/secure/join_code.h"
 #include "common/wire/framing.h"
+#include "server/relay/upstream.h"
 #include "server/session/replication/validation.h"
 #include "server/web/bridge/bridge.h"
 #include "server/web/bridge/server_clock.h"
@@ -46,31 +46,21 @@ struct UplinkOptions {
   std::chrono::milliseconds silence{3000};
 };
 
-struct UplinkEvents {
-  std::function<void(const proto::Welcome&)> welcome;
-  // An error ends the connection, which is then made again.
-  std::function<Status(const proto::Envelope&, const wire::SharedBytes& framed)> message;
-  std::function<void(const std::string& why)> lost;
-  std::function<void(replication::EndReason reason, const std::string& text)> over;
-};
-
-class Uplink {
+class Uplink final : public Upstream {
  public:
-  // `events` are called on the executor's thread; none after stop().
-  Uplink(asio::any_io_executor executor, UplinkOptions options, UplinkEvents events);
-  ~Uplink();
+  Uplink(asio::any_io_executor executor, UplinkOptions options);
+  ~Uplink() override;
 
-  void start();
+  void start(UpstreamEvents events) override;
   // Says Bye where somebody listens, and ends what is under way.
-  void stop();
-  // Queues a message for the server; nothing happens while there is no connection.
-  void say(const proto::Envelope& message);
+  void stop() override;
+  void say(const proto::Envelope& message) override;
 
-  bool is_welcome() const { return is_welcome_; }
-  // The server's clock at this time of ours, in us; 0: not known yet.
-  std::uint64_t server_time_us(std::uint64_t now_us) const { return clock_.at(now_us); }
-  std::uint64_t bytes_received() const { return bridge_.counters.session_bytes; }
-  std::uint64_t returns() const { return returns_; }
+  std::string name() const override { return options_.server.name; }
+  bool is_welcome() const override { return is_welcome_; }
+  std::uint64_t server_time_us(std::uint64_t now_us) const override { return clock_.at(now_us); }
+  std::uint64_t bytes_received() const override { return bridge_.counters.session_bytes; }
+  std::uint64_t returns() const override { return returns_; }
 
  private:
   asio::awaitable<void> run();
@@ -86,11 +76,11 @@ class Uplink {
   void take_welcome(const proto::Welcome& welcome);
   void end(replication::EndReason reason, const std::string& text);
   void cut();
-  std::string name() const;
+  std::string name_there() const;
 
   asio::any_io_executor executor_;
   const UplinkOptions options_;
-  UplinkEvents events_;
+  UpstreamEvents events_;
   bridge::Bridge bridge_;
   std::unique_ptr<bridge::SessionLink> link_;
   bridge::ServerClock clock_;

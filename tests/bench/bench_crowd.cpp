@@ -51,6 +51,7 @@ struct Options {
   double seconds = 10, settle_seconds = 15;
   std::vector<int> watchers{100};
   int hands = 8, relays = 0;
+  std::string nats;  // URL; empty: each relay hangs on the server
   unsigned threads = 1;
 };
 
@@ -230,9 +231,12 @@ class Crowd {
                                    TROCAR_SOURCE_DIR "/deploy/scenes/" + script + ".toml"},
           folder_ / (name + ".log")));
     }
-    for (int i = 0; i < options.relays; ++i)
-      start("trocar-relay", "relay" + std::to_string(i),
-            {"--to", "127.0.0.1:" + std::to_string(server), "--max-watchers", "10000"});
+    const auto to = "127.0.0.1:" + std::to_string(server);
+    for (int i = 0; i < options.relays; ++i) {
+      std::vector<std::string> arguments{"--to", to, "--max-watchers", "10000"};
+      if (!options.nats.empty()) add_nats(options.nats, i == 0, server, arguments);
+      start("trocar-relay", "relay" + std::to_string(i), arguments);
+    }
   }
   ~Crowd() {
     for (const auto& program : programs_) program->signal(SIGTERM);
@@ -264,6 +268,15 @@ class Crowd {
   }
 
  private:
+  // The first relay publishes the session, and the others take it from there.
+  static void add_nats(const std::string& url, bool is_first, std::uint16_t server,
+                       std::vector<std::string>& arguments) {
+    const auto name = "bench-" + std::to_string(::getpid());
+    arguments.insert(arguments.end(),
+                     {"--nats", url, is_first ? "--publish" : "--from-nats", name});
+    const auto code = secure::read_link_file(server, "observer");
+    if (!is_first && code) arguments.insert(arguments.end(), {"--code", secure::to_text(*code)});
+  }
   void start(const std::string& program, const std::string& name,
              std::vector<std::string> arguments) {
     static std::uint16_t next_metrics = 17'930;
@@ -351,6 +364,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--relays", options.relays, "between server and watchers; 0: none")
       ->check(CLI::Range(0, 16));
+  app.add_option("--nats", options.nats,
+                 "a NATS that runs, over which all relays but the first have the session")
+      ->type_name("URL");
   app.add_option("--hands", options.hands, "scripted ones")->check(CLI::Range(0, kMaxHands));
   app.add_option("--threads", options.threads, "of the watchers")->check(CLI::Range(1, 64));
   CLI11_PARSE(app, argc, argv);

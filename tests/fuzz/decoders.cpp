@@ -27,6 +27,7 @@
 #include "proto/fine_surface.pb.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
+#include "server/broadcast/piece.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/dicom/dicom_reader.h"
@@ -174,6 +175,24 @@ bool decode_handshake(BytesView bytes) {
       channel = listener.receive(datagram, "192.0.2.1 5000", send);
   }
   return answers > 0;
+}
+
+// Pieces of a session on a bus, each behind its length of 16 bits. Accepted: they made a whole, and
+// what is in it are Envelopes.
+bool decode_broadcast(BytesView bytes) {
+  broadcast::Assembler assembler;
+  ByteReader reader(bytes);
+  while (true) {
+    const auto piece = broadcast::read_piece(reader.read_bytes(reader.read<std::uint16_t>()));
+    if (!reader.ok()) return false;
+    if (!checked(piece) || piece->pieces == 0) continue;
+    const auto whole = assembler.add(*piece);
+    if (!checked(whole) || !*whole) continue;
+    const auto messages = broadcast::split_messages(**whole);
+    return checked(messages) && std::ranges::all_of(*messages, [](BytesView framed) {
+             return decode_envelope(framed.subspan(wire::kHeaderBytes));
+           });
+  }
 }
 
 bool decode_topology(BytesView bytes) {
@@ -407,6 +426,7 @@ constexpr Decoder kDecoders[] = {
     {"blood", decode_blood},
     {"bleeding", decode_bleeding},
     {"handshake", decode_handshake},
+    {"broadcast", decode_broadcast},
     {"surface_topology", decode_topology},
     {"surface_change", decode_change},
     {"fine_surface", decode_fine_surface},

@@ -14,6 +14,7 @@
 #include "common/wire/surface_slices.h"
 #include "proto/fine_surface.pb.h"
 #include "proto/wire.pb.h"
+#include "server/broadcast/piece.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
@@ -147,6 +148,21 @@ void save_handshakes() {
   client->start();
 }
 
+void save_broadcast() {
+  proto::Envelope welcome, ping;
+  welcome.mutable_welcome()->set_organ_hash(42);
+  ping.mutable_ping()->set_client_time_us(7);
+  Bytes whole = *wire::encode_envelope(welcome), bytes;
+  const auto second = wire::encode_envelope(ping);
+  whole.insert(whole.end(), second->begin(), second->end());
+  ByteWriter writer(bytes);
+  for (const auto& piece : broadcast::cut(5, 1, whole, broadcast::kPieceHeaderBytes + 10)) {
+    writer.put(static_cast<std::uint16_t>(piece.size()));
+    writer.put_bytes(piece);
+  }
+  save("broadcast", "pieces", bytes);
+}
+
 void save_envelopes() {
   proto::Envelope hello;
   hello.mutable_hello()->set_name("Ada");
@@ -218,6 +234,7 @@ int main(int argc, char** argv) {
   root = argv[1];
   save_surfaces();
   save_envelopes();
+  save_broadcast();
   save_haptics();
   save_teaching();
   save_slices();

@@ -1,6 +1,6 @@
 // Who has the hall's key may ask over the bus, once for each request; nobody else may.
 
-#include "server/hall/bus/proof.h"
+#include "server/hall/proof/proof.h"
 
 #include <gtest/gtest.h>
 

@@ -130,6 +130,11 @@ write_config elsewhere.conf $port elsewhere
 start_nats elsewhere.conf
 wait_for_port $port
 refused 4 'under that name' $url --nats-ca ours.pem --nats-creds creds
+for _ in $(seq 100); do
+  [ "$(grep -c 'TLS handshake error' nats.log)" -ge 8 ] && break
+  sleep 0.1
+done
+[ "$(grep -c 'under that name' hall.log)" = 1 ] || fail "the hall does not say once what is wrong"
 kill -TERM $hall
 wait $hall || fail "the hall ended with $?"
 hall=

@@ -40,10 +40,9 @@ HallBus::HallBus(asio::io_context& context, HallServer& server, const std::strin
       timer_(context) {}
 
 Result<std::unique_ptr<HallBus>> HallBus::open(asio::io_context& context, HallServer& server,
-                                               const hall::BusPlace& place,
-                                               const std::string& key) {
+                                               const bus::BusPlace& place, const std::string& key) {
   std::unique_ptr<HallBus> made(new HallBus(context, server, key));
-  auto bus = hall::Bus::connect(place, "trocar-hall " + made->name_, true);
+  auto bus = bus::Bus::connect(place, "trocar-hall " + made->name_, true);
   if (!bus) return bus.error();
   made->bus_ = std::move(*bus);
   if (const auto subscribed = made->subscribe(); !subscribed) return subscribed.error();
@@ -85,7 +84,7 @@ void HallBus::take_request(const std::string& text, const std::string& answer_to
   const auto request = hall::read_bus_request(text);
   if (!request) return;
   const auto proof = proofs_.check(*request, std::time(nullptr));
-  const std::weak_ptr<hall::Bus> bus = bus_;
+  const std::weak_ptr<bus::Bus> bus = bus_;
   server_.answer(*request, proof, [bus, answer_to](const std::string& answer) {
     if (const auto still = bus.lock()) still->publish(answer_to, answer);
   });

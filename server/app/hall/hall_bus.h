@@ -5,7 +5,7 @@
 //
 //   trocar.hall.state           published: a directory, as GET /sessions has it, with "hall"
 //   trocar.hall.directory       asked: every hall answers with its directory
-//   trocar.hall.NAME.request    asked: one hall answers (server/hall/bus/proof.h)
+//   trocar.hall.NAME.request    asked: one hall answers (server/hall/proof/proof.h)
 //
 // At most kMostWaiting messages wait for the hall's thread, of kMostRequestText bytes each: more
 // are left out. Thread: that of the I/O context.
@@ -20,8 +20,8 @@
 
 #include "common/base/result.h"
 #include "server/app/hall/hall_server.h"
-#include "server/hall/bus/bus.h"
-#include "server/hall/bus/proof.h"
+#include "server/bus/bus.h"
+#include "server/hall/proof/proof.h"
 
 namespace trocar::app {
 
@@ -38,7 +38,7 @@ class HallBus {
 
   // Takes `context` and `server`, which outlive it. ErrorCode::Usage for a wrong URL.
   static Result<std::unique_ptr<HallBus>> open(asio::io_context& context, HallServer& server,
-                                               const hall::BusPlace& place, const std::string& key);
+                                               const bus::BusPlace& place, const std::string& key);
   void stop();
   const std::string& name() const { return name_; }
 
@@ -55,7 +55,7 @@ class HallBus {
   const std::string name_;
   hall::ProofCheck proofs_;
   asio::steady_timer timer_;
-  std::shared_ptr<hall::Bus> bus_;
+  std::shared_ptr<bus::Bus> bus_;
   std::atomic<int> waiting_ = 0;  // messages for the hall's thread
   std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };

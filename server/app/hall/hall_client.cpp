@@ -6,7 +6,7 @@
 
 #include "common/base/printable.h"
 #include "server/app/hall/hall_bus.h"
-#include "server/hall/bus/proof.h"
+#include "server/hall/proof/proof.h"
 #include "server/session/monitoring/http_ask.h"
 
 namespace trocar::app {

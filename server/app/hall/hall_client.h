@@ -10,7 +10,7 @@
 #include "common/base/json.h"
 #include "common/base/result.h"
 #include "common/secure/tls.h"
-#include "server/hall/bus/bus.h"
+#include "server/bus/bus.h"
 
 namespace trocar::app {
 
@@ -49,14 +49,14 @@ class HallClient final : public HallConnection {
 class BusHallClient final : public HallConnection {
  public:
   // `bus` outlives it. `name`: the hall's.
-  BusHallClient(hall::Bus& bus, std::string name, std::string key)
+  BusHallClient(bus::Bus& bus, std::string name, std::string key)
       : bus_(bus), name_(std::move(name)), key_(std::move(key)) {}
 
   Result<Json> ask(const std::string& method, const std::string& path, const std::string& body,
                    std::chrono::seconds deadline) const override;
 
  private:
-  hall::Bus& bus_;
+  bus::Bus& bus_;
   const std::string name_, key_;
 };
 

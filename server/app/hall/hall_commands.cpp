@@ -14,7 +14,7 @@
 #include "server/app/hall/hall_client.h"
 #include "server/app/hall/hall_server.h"
 #include "server/app/hall/hall_start.h"
-#include "server/hall/bus/bus.h"
+#include "server/bus/bus.h"
 #include "server/hall/plan/hall_config.h"
 
 namespace trocar::app {
@@ -156,7 +156,7 @@ bool is_hall_name(const std::string& name) {
 }
 
 // Returns those that answer, the one with the most room first.
-std::vector<Json> halls_of(hall::Bus& bus) {
+std::vector<Json> halls_of(bus::Bus& bus) {
   std::vector<Json> halls;
   for (const auto& text : bus.ask_all(kDirectorySubject, "", kBusWait)) {
     auto hall = Json::parse(text, nullptr, false);
@@ -176,7 +176,7 @@ void list_all(const std::vector<Json>& halls, bool is_json) {
   }
 }
 
-Status start_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const HallOptions& options,
+Status start_anywhere(bus::Bus& bus, const std::vector<Json>& halls, const HallOptions& options,
                       const std::string& key) {
   Error why{ErrorCode::Refused,
             options.what + ": no hall that answers may start it, see list --nats"};
@@ -195,7 +195,7 @@ Status start_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const Hall
   return why;
 }
 
-Status end_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const std::string& name,
+Status end_anywhere(bus::Bus& bus, const std::vector<Json>& halls, const std::string& name,
                     const std::string& key) {
   std::vector<std::string> with_it;
   for (const auto& hall : halls)
@@ -210,7 +210,7 @@ Status end_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const std::s
 }
 
 Status run_on_bus(const HallOptions& options, const std::string& key) {
-  const auto bus = hall::Bus::connect(options.nats, "trocar-hall command", false);
+  const auto bus = bus::Bus::connect(options.nats, "trocar-hall command", false);
   if (!bus) return bus.error();
   const auto halls = halls_of(**bus);
   if (options.command == HallCommand::Start) return start_anywhere(**bus, halls, options, key);

@@ -27,7 +27,7 @@
 
 #include "common/base/result.h"
 #include "common/secure/tls.h"
-#include "server/hall/bus/proof.h"
+#include "server/hall/proof/proof.h"
 #include "server/hall/sessions/sessions.h"
 
 namespace trocar::app {

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "common/base/version.h"
+#include "server/app/config/nats_options.h"
 
 namespace trocar::app {
 namespace {
@@ -37,19 +38,6 @@ Exit codes: 0 ok, also after Ctrl-C, 2 command line, 3 bad file, 4 the hall says
 hall there.
 )";
 
-void add_nats_options(CLI::App& app, HallOptions& options, const char* meaning) {
-  auto* url = app.add_option("--nats", options.nats.url, meaning)->type_name("URL");
-  app.add_option("--nats-ca", options.nats.ca_file,
-                 "who vouches for the certificate of tls://HOST:PORT (PEM) [whom this machine "
-                 "trusts]")
-      ->needs(url)
-      ->type_name("FILE");
-  app.add_option("--nats-creds", options.nats.creds_file,
-                 "get in with this file: a line USER:PASSWORD, or NATS's own credentials [no]")
-      ->needs(url)
-      ->type_name("FILE");
-}
-
 void add_command_options(CLI::App& command, HallOptions& options) {
   command.add_option("--at", options.at, "where the hall is; https://HOST:PORT: over TLS")
       ->type_name("HOST:PORT")
@@ -59,7 +47,7 @@ void add_command_options(CLI::App& command, HallOptions& options) {
                   "the certificate that the hall has to show (PEM) [one that this machine trusts, "
                   "of this host]")
       ->type_name("FILE");
-  add_nats_options(command, options, "ask all halls of this NATS instead");
+  add_nats_options(command, options.nats, "ask all halls of this NATS instead");
   command.add_option("--key", options.key_file, "file with the hall's key")->type_name("FILE");
 }
 
@@ -99,7 +87,7 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
   app.add_flag("--check-config", options.checks_config,
                "check the file as a start would, and exit with 0 or 2")
       ->needs(config);
-  add_nats_options(app, options,
+  add_nats_options(app, options.nats,
                    "tell others over this NATS what runs here, and take their requests [no]");
   app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
       ->type_name("FILE");

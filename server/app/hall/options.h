@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/hall/bus/bus.h"
+#include "server/bus/bus.h"
 
 namespace trocar::app {
 
@@ -27,7 +27,7 @@ struct HallOptions {
   std::string what;              // the lesson to start, the session to end
   std::string name;              // of a new session; empty: the hall gives one
   bool is_json = false;
-  hall::BusPlace nats;  // of both; without a URL: none
+  bus::BusPlace nats;  // of both; without a URL: none
 };
 
 // Nothing if the program is done (after --help or --version).

@@ -6,7 +6,9 @@
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "server/app/config/config_file.h"
+#include "server/app/config/nats_options.h"
 #include "server/app/config/place.h"
+#include "server/broadcast/subjects.h"
 
 namespace trocar::app {
 namespace {
@@ -23,11 +25,15 @@ Examples:
       who watches uses the relay as if it were the server
   trocar-relay --to 10.0.0.5:7690 --code CODE --certificate relay.crt --key relay.key --also b:7695
       one of two relays with one certificate, so that one code and one link is good for both
+  trocar-relay --to 10.0.0.5:7690 --code CODE --nats nats://10.0.0.2:4222 --publish monday
+      a relay that passes the session on over NATS, too
+  trocar-relay --from-nats monday --nats nats://10.0.0.2:4222 --code CODE --port 7695
+      one of many relays that take it from there: the server sends nothing more for them
   trocar-relay --config relay.toml --check-config
       are these options fine? deploy/trocar-relay.toml.example has all of them
 
 Exit codes: 0 ok, also when the session has ended, 2 command line, 3 bad file, 4 refused by the
-server, 5 port taken or no server.
+server, 5 port taken, no server, or nobody who publishes.
 )";
 constexpr std::size_t kMostNameBytes = 29;  // a number may follow
 constexpr std::size_t kMostFurther = 8;
@@ -38,6 +44,15 @@ CLI::Validator short_name() {
                                  text.size() <= kMostNameBytes && text.front() != ' ' &&
                                  text.back() != ' ';
             return is_fine ? "" : "is not a name of 1 to 29 printable bytes";
+          },
+          ""};
+}
+
+CLI::Validator session_name() {
+  return {[](std::string& text) -> std::string {
+            return broadcast::is_session_name(text)
+                       ? ""
+                       : "is not a name of 1 to 64 letters, digits, hyphens and underscores";
           },
           ""};
 }
@@ -54,6 +69,7 @@ class CommandLine {
 
  private:
   void add_access_options();
+  void add_nats_options();
   Status read_server();
   Status read_further();
 
@@ -126,7 +142,22 @@ CommandLine::CommandLine() {
                 "check all options as a start would, and exit with 0 or 2")
       ->needs(config)
       ->configurable(false);
+  add_nats_options();
   add_access_options();
+}
+
+void CommandLine::add_nats_options() {
+  auto* nats = app_.add_option_group("NATS", "one relay for all the others");
+  app::add_nats_options(*nats, options_.nats, "reach relays of this session over this NATS [no]");
+  nats->add_option("--publish", options_.publish,
+                   "pass the session on over NATS under this name, too [no]")
+      ->type_name("SESSION")
+      ->check(session_name());
+  nats->add_option("--from-nats", options_.from_nats,
+                   "take the session of this name from NATS instead of from its server; --code, or "
+                   "the link of --to, says which code watchers need [no]")
+      ->type_name("SESSION")
+      ->check(session_name());
 }
 
 void CommandLine::add_access_options() {
@@ -198,10 +229,32 @@ Status CommandLine::finish() {
                      options_.metrics_port);
 }
 
+// Options that need each other.
+Status check_together(const RelayOptions& options) {
+  const auto &publish = options.publish, &from = options.from_nats;
+  if (!publish.empty() && !from.empty())
+    return Error{ErrorCode::Usage, "--publish: a session --from-nats is published already"};
+  if (options.nats.url.empty()) {
+    if (!publish.empty()) return Error{ErrorCode::Usage, "--publish: needs --nats URL"};
+    if (!from.empty()) return Error{ErrorCode::Usage, "--from-nats: needs --nats URL"};
+    return {};
+  }
+  if (publish.empty() && from.empty())
+    return Error{ErrorCode::Usage, "--nats: needs --publish or --from-nats"};
+  if (!from.empty() && !options.code)
+    return Error{ErrorCode::Usage,
+                 "--code: --from-nats needs an observer's join code of the session, for watchers"};
+  return bus::check_place(options.nats);
+}
+
 }  // namespace
 
 Result<std::optional<RelayOptions>> parse_relay_command_line(int argc, char** argv) {
-  return read_command_line<CommandLine>(argc, argv, kExampleFile);
+  auto read = read_command_line<CommandLine>(argc, argv, kExampleFile);
+  if (!read || !*read) return read;
+  if (const auto fine = check_together(**read); !fine)
+    return Error{ErrorCode::Usage, (*read)->origins.placed(fine.error().message)};
+  return read;
 }
 
 }  // namespace trocar::app

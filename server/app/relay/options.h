@@ -9,6 +9,7 @@
 #include "common/base/result.h"
 #include "common/secure/join_code.h"
 #include "server/app/config/option_origins.h"
+#include "server/bus/bus_place.h"
 #include "server/web/bridge/bridge.h"
 
 namespace trocar::app {
@@ -20,6 +21,8 @@ struct RelayOptions {
   std::uint16_t port = 7695;
   std::string name;                            // in the server's list; empty: made of the port
   std::vector<std::string> further_addresses;  // "HOST:PORT"
+  bus::BusPlace nats;                          // without a URL: none
+  std::string publish, from_nats;  // the session's name there, one of the two; empty: not asked for
   int most_watchers = 1000;
   bool is_stream_only = false;
   std::string metrics_address;  // empty: no figures

@@ -23,7 +23,11 @@
 #include "common/secure/private_files.h"
 #include "common/secure/public_host.h"
 #include "common/secure/tls.h"
+#include "server/broadcast/bus_channel.h"
+#include "server/broadcast/publisher.h"
+#include "server/broadcast/tap.h"
 #include "server/relay/relay.h"
+#include "server/relay/uplink.h"
 #include "server/session/monitoring/exposition.h"
 #include "server/session/monitoring/figures_server.h"
 #include "server/session/net/tcp_server.h"
@@ -97,7 +101,7 @@ std::string to_exposition(const relay::RelayFigures& figures) {
   text.gauge("connected", "1 while the relay is in the session.", number(figures.is_connected));
   text.counter("returns_total", "Times that it has come back to the server.",
                number(figures.returns));
-  text.counter("server_received_bytes_total", "Bytes from the server.",
+  text.counter("server_received_bytes_total", "Bytes from the server, or from NATS.",
                number(figures.server_bytes));
   text.gauge("watchers", "People who watch through it.", number(figures.watchers));
   text.gauge("connections", "Connections now.", number(figures.connections));
@@ -119,7 +123,9 @@ std::string to_exposition(const relay::RelayFigures& figures) {
 
 class RelayServer {
  public:
-  RelayServer(const RelayOptions& options, Access access);
+  // `context` outlives this.
+  RelayServer(asio::io_context& context, const RelayOptions& options, Access access,
+              std::unique_ptr<relay::Upstream> upstream);
   ~RelayServer();
 
   Status run();
@@ -129,9 +135,9 @@ class RelayServer {
   Status open_figures();
   void end();
 
+  asio::io_context& io_;
   const RelayOptions& options_;
   const Access access_;
-  asio::io_context io_{1};
   asio::signal_set signals_{io_, SIGINT, SIGTERM};
   asio::steady_timer limit_{io_};
   relay::Relay relay_;
@@ -142,9 +148,7 @@ class RelayServer {
 
 relay::RelayOptions relay_options(const RelayOptions& options, const Access& access) {
   relay::RelayOptions chosen;
-  chosen.uplink.server = options.server;
-  chosen.uplink.code = access.server;
-  chosen.uplink.name = name_of(options);
+  chosen.secret = access.server.secret;
   chosen.tcp.address = options.address;
   chosen.tcp.port = options.port;
   chosen.tcp.tls = access.tls;
@@ -154,10 +158,48 @@ relay::RelayOptions relay_options(const RelayOptions& options, const Access& acc
   return chosen;
 }
 
-RelayServer::RelayServer(const RelayOptions& options, Access access)
-    : options_(options),
+Result<std::unique_ptr<broadcast::Channel>> open_channel(asio::io_context& context,
+                                                         const RelayOptions& options) {
+  auto bus = bus::Bus::connect(options.nats, "trocar-relay " + name_of(options), true);
+  if (!bus) return bus.error();
+  return std::unique_ptr<broadcast::Channel>(
+      std::make_unique<broadcast::BusChannel>(context.get_executor(), std::move(*bus)));
+}
+
+template <typename Kind>
+Result<std::unique_ptr<relay::Upstream>> listening(std::unique_ptr<Kind> made) {
+  if (const auto heard = made->listen(); !heard) return heard.error();
+  return std::unique_ptr<relay::Upstream>(std::move(made));
+}
+
+Result<std::unique_ptr<relay::Upstream>> open_upstream(asio::io_context& context,
+                                                       const RelayOptions& options,
+                                                       const Access& access) {
+  const auto executor = context.get_executor();
+  std::unique_ptr<broadcast::Channel> channel;
+  if (!options.nats.url.empty()) {
+    auto opened = open_channel(context, options);
+    if (!opened) return opened.error();
+    channel = std::move(*opened);
+  }
+  if (!options.from_nats.empty())
+    return listening(std::make_unique<broadcast::Tap>(
+        executor, std::move(channel), broadcast::TapOptions{.session = options.from_nats}));
+  std::unique_ptr<relay::Upstream> uplink = std::make_unique<relay::Uplink>(
+      executor, relay::UplinkOptions{
+                    .server = options.server, .code = access.server, .name = name_of(options)});
+  if (!channel) return uplink;
+  return listening(std::make_unique<broadcast::Publisher>(
+      executor, std::move(uplink), std::move(channel),
+      broadcast::PublisherOptions{.session = options.publish}));
+}
+
+RelayServer::RelayServer(asio::io_context& context, const RelayOptions& options, Access access,
+                         std::unique_ptr<relay::Upstream> upstream)
+    : io_(context),
+      options_(options),
       access_(std::move(access)),
-      relay_(io_, relay_options(options_, access_),
+      relay_(io_, std::move(upstream), relay_options(options_, access_),
              {.ready = [this](std::uint16_t port) { note_ready(port); },
               .over =
                   [this](const Status& outcome) {
@@ -227,7 +269,11 @@ Status RelayServer::run() {
 Status run_relay(const RelayOptions& options) {
   auto access = prepare_access(options);
   if (!access) return access.error();
-  const auto server = std::make_unique<RelayServer>(options, std::move(*access));
+  asio::io_context context{1};
+  auto upstream = open_upstream(context, options, *access);
+  if (!upstream) return upstream.error();
+  const auto server =
+      std::make_unique<RelayServer>(context, options, std::move(*access), std::move(*upstream));
   return server->run();
 }
 

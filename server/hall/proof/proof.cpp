@@ -1,4 +1,4 @@
-#include "server/hall/bus/proof.h"
+#include "server/hall/proof/proof.h"
 
 #include <array>
 

@@ -1,12 +1,18 @@
 #pragma once
 
-// A connection to NATS, over which halls tell each other and people what runs where. A build
+// A connection to NATS, over which programs on many machines tell each other things. A build
 // without libnats has none, and connect() says so.
 //
-// A hall's connection is patient: it is there before its NATS is, and comes back by itself when
-// that was restarted; what is published meanwhile is left out. Texts are at most kMostTextBytes,
-// longer ones are not handed on.
-// Threads: publish() and ask...() any one; what is subscribed is called on the library's threads.
+// A patient connection is there before its NATS is. When NATS was restarted, has refused the user,
+// or has shown a wrong certificate, it is tried again after 0.25 s, then after longer pauses of up
+// to 4 s, for as long as it takes; each trouble is logged once, until it is another one. What is
+// published meanwhile is left out, and what was subscribed is heard again. (libnats's own way back
+// is not used: it ends for good when a user was refused twice.)
+//
+// Texts are any bytes, at most kMostTextBytes; longer ones are not handed on. A connection does not
+// hear itself.
+// Threads: publish() and ask...() any one; what is subscribed is called on the library's threads,
+// in order for each subject. publish() may wait for the socket, for 2 s at most.
 
 #include <chrono>
 #include <functional>
@@ -15,18 +21,9 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "server/bus/bus_place.h"
 
-namespace trocar::hall {
-
-// Returns `url` without what stands before an @ in each of its addresses: "nats://***@HOST:PORT".
-std::string without_passwords(const std::string& url);
-
-// Names a NATS, and how one gets in.
-struct BusPlace {
-  std::string url;      // nats://HOST:PORT or tls://HOST:PORT, or several with commas, no user
-  std::string ca_file;  // PEM of who vouches for its certificate; empty: whom this machine trusts
-  std::string creds_file;  // USER:PASSWORD, or NATS's own credentials (JWT); empty: none
-};
+namespace trocar::bus {
 
 class Bus {
  public:
@@ -46,13 +43,16 @@ class Bus {
   // `take` is kept until the end.
   Status subscribe(const std::string& subject, Take take);
   // False: there is no connection now, or the text is too long.
-  bool publish(const std::string& subject, const std::string& text);
+  bool publish(const std::string& subject, const std::string& text,
+               const std::string& answer_to = "");
   // All answers that come within `wait`.
   std::vector<std::string> ask_all(const std::string& subject, const std::string& text,
                                    std::chrono::milliseconds wait);
   // The first answer. ErrorCode::ResourceMissing: none comes.
   Result<std::string> ask(const std::string& subject, const std::string& text,
                           std::chrono::milliseconds deadline);
+  // Returns how large a text this NATS takes, in bytes; 0: there is no connection now.
+  std::size_t most_bytes() const;
 
  private:
   struct Parts;
@@ -61,4 +61,4 @@ class Bus {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace trocar::hall
+}  // namespace trocar::bus

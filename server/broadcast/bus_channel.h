@@ -1,0 +1,54 @@
+#pragma once
+
+// A Channel over NATS. What comes waits for the executor's thread, kMostWaitingBytes of it; what
+// goes out waits for a thread of its own, likewise, because a bus may wait for its socket. At the
+// end that thread has a second to send what is left.
+// Thread: that of the executor.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <atomic>
+#include <boost/asio/any_io_executor.hpp>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "server/broadcast/channel.h"
+#include "server/bus/bus.h"
+
+namespace trocar::broadcast {
+
+class BusChannel final : public Channel {
+ public:
+  static constexpr std::size_t kMostWaitingBytes = 64 * 1024 * 1024;
+
+  BusChannel(asio::any_io_executor executor, std::unique_ptr<bus::Bus> bus);
+  ~BusChannel() override;
+
+  Status listen(const std::string& subject, Take take) override;
+  void send(const std::string& subject, Bytes bytes, const std::string& answer_to) override;
+  std::size_t waiting_bytes() const override { return waiting_out_; }
+  std::size_t most_bytes() const override { return bus_->most_bytes(); }
+
+ private:
+  struct Letter {
+    std::string subject, text, answer_to;
+  };
+  void send_all(const std::stop_token& stop);
+
+  asio::any_io_executor executor_;
+  std::vector<std::shared_ptr<Take>> takes_;  // the bus has them as weak pointers
+  const std::shared_ptr<std::atomic<std::size_t>> waiting_in_ =
+      std::make_shared<std::atomic<std::size_t>>(0);
+  std::mutex lock_;  // of the letters
+  std::condition_variable_any has_letter_;
+  std::deque<Letter> letters_;
+  std::atomic<std::size_t> waiting_out_ = 0;
+  std::unique_ptr<bus::Bus> bus_;
+  std::jthread sender_;
+};
+
+}  // namespace trocar::broadcast

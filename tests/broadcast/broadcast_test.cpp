@@ -1,0 +1,479 @@
+// A session over a bus: what a publisher has received reaches those who take it, whenever they
+// come, whatever is lost on the way, and whoever else publishes. The session is a real server
+// without a simulation; the bus is one in memory, and so is the clock.
+
+#include <gtest/gtest.h>
+
+#include "server/broadcast/publisher.h"
+#include "server/broadcast/tap.h"
+#include "server/session/replication/messages.h"
+#include "tests/broadcast/fake_bus.h"
+#include "tests/network/session_fixture.h"
+
+namespace trocar::broadcast {
+namespace {
+
+using proto::Envelope;
+using testing::LiveSession;
+using testing::RawClient;
+
+constexpr const char* kName = "monday";
+
+// One that passes the session on, with a connection to the server of its own.
+struct Source {
+  Source(FakeBus& bus, asio::io_context& io, LiveSession& from, std::uint64_t id,
+         const std::function<std::uint64_t()>& clock_ns)
+      : session(from),
+        publisher(io.get_executor(), std::make_unique<FakeUpstream>(upstream),
+                  std::make_unique<FakeChannel>(bus), {kName, id, clock_ns}) {
+    EXPECT_TRUE(publisher.listen().ok());
+    publisher.start({.welcome = [this](const auto&) { ++welcomes; },
+                     .message =
+                         [this](const auto&, const auto&) {
+                           ++messages;
+                           return Status();
+                         },
+                     .lost = {},
+                     .over = {}});
+  }
+  // Joins the server, up to the first picture.
+  void join(const std::string& name = "Relay") {
+    client = std::make_unique<RawClient>(session.port());
+    ASSERT_TRUE(client->send(testing::make_hello(name, proto::ROLE_OBSERVER)));
+    const auto welcome = client->receive(Envelope::kWelcome);
+    ASSERT_TRUE(welcome);
+    upstream.is_welcome = true;
+    auto told = welcome->welcome();
+    told.set_return_token("0123456789abcdef");
+    told.add_further_address("10.0.0.7:7690");
+    upstream.events.welcome(told);
+    pass_on();
+  }
+  // Hands on what the server says, up to the next FrameState.
+  void pass_on() {
+    while (const auto message = client->receive()) {
+      ASSERT_TRUE(upstream.events.message(*message, wire::encode_envelope(*message)).ok());
+      if (message->has_frame_state()) return;
+    }
+    FAIL() << "the server has closed";
+  }
+  void say(const Envelope& message) {
+    ASSERT_TRUE(upstream.events.message(message, wire::encode_envelope(message)).ok());
+  }
+
+  LiveSession& session;
+  FakeUpstream::State upstream;
+  std::unique_ptr<RawClient> client;
+  int welcomes = 0, messages = 0;
+  Publisher publisher;
+};
+
+// A relay's place behind a tap.
+struct Taker {
+  Taker(FakeBus& bus, asio::io_context& io, const std::function<std::uint64_t()>& clock_ns)
+      : tap(io.get_executor(), std::make_unique<FakeChannel>(bus),
+            {.session = kName, .clock_ns = clock_ns}) {
+    EXPECT_TRUE(tap.listen().ok());
+    tap.start({.welcome =
+                   [this](const auto& welcome) {
+                     welcomes.push_back(welcome);
+                     copy = std::make_unique<bridge::SessionCopy>();
+                   },
+               .message =
+                   [this](const auto& message, const auto& framed) {
+                     const auto news = copy->take(message, framed);
+                     if (copy->needs_keyframe()) {
+                       Envelope request;
+                       request.mutable_keyframe_request();
+                       tap.say(request);
+                     }
+                     return news.ok() ? Status() : news.error();
+                   },
+               .lost = [this](const std::string&) { ++losses; },
+               .over = [this](replication::EndReason, const std::string& text) { over = text; }});
+  }
+  // 0: there is no picture.
+  std::uint32_t crc() const { return copy && copy->has_frame() ? copy->surface_crc() : 0; }
+
+  std::vector<proto::Welcome> welcomes;
+  std::unique_ptr<bridge::SessionCopy> copy;
+  int losses = 0;
+  std::string over;
+  Tap tap;
+};
+
+class Broadcast : public ::testing::Test {
+ protected:
+  Broadcast() {
+    make(10);
+    first_.join();
+    pass(2.0);
+  }
+  std::unique_ptr<Source> make_source(std::uint64_t id) {
+    return std::make_unique<Source>(bus_, io_, session_, id, clock_);
+  }
+  Taker& come() {
+    takers_.push_back(std::make_unique<Taker>(bus_, io_, clock_));
+    bus_.deliver();
+    return *takers_.back();
+  }
+  // The clock goes on, and everybody attends to his business ten times a second.
+  void pass(double seconds) {
+    for (int i = 0; i < seconds * 10; ++i) {
+      now_ns_ += 100'000'000;
+      first_.publisher.attend();
+      for (const auto& other : others_) other->publisher.attend();
+      for (const auto& taker : takers_) taker->tap.attend();
+      bus_.deliver();
+    }
+  }
+  // The next frame reaches the first source.
+  void publish(std::size_t changes, bool is_cut = false) {
+    make(changes, is_cut);
+    first_.pass_on();
+    bus_.deliver();
+  }
+  // The server publishes the next frame, and nobody has it yet.
+  void make(std::size_t changes, bool is_cut = false) {
+    const auto frame = session_.make_frame(changes, is_cut);
+    newest_crc_ = wire::surface_crc(frame->surface);
+    session_.publish_all({frame});
+  }
+
+  std::uint32_t newest_crc_ = 0;
+  std::uint64_t now_ns_ = 1'000'000'000'000;
+  const std::function<std::uint64_t()> clock_ = [this] { return now_ns_; };
+  LiveSession session_;
+  asio::io_context io_{1};  // it never runs: timers do not matter here
+  FakeBus bus_;
+  Source first_{bus_, io_, session_, 100, clock_};
+  std::vector<std::unique_ptr<Source>> others_;
+  std::vector<std::unique_ptr<Taker>> takers_;
+};
+
+TEST_F(Broadcast, who_comes_late_has_the_picture_and_follows_it) {
+  publish(20);
+  publish(20, true);
+  auto& ann = come();
+  ASSERT_EQ(ann.welcomes.size(), 1u);
+  EXPECT_EQ(ann.welcomes[0].organ_hash(), 42u);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  publish(20);
+  publish(20, true);
+  publish(20);
+  auto& ben = come();
+  publish(20);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ben.crc(), newest_crc_);
+  EXPECT_EQ(ann.tap.counters().asks, 1u);
+  EXPECT_EQ(ben.tap.counters().asks, 1u);
+  EXPECT_EQ(first_.welcomes, 1);
+  EXPECT_GT(first_.messages, 10) << "the relay that publishes has everything as well";
+}
+
+TEST_F(Broadcast, the_secrets_of_the_relay_that_publishes_do_not_go_out) {
+  auto& ann = come();
+  ASSERT_EQ(ann.welcomes.size(), 1u);
+  EXPECT_TRUE(ann.welcomes[0].return_token().empty());
+  EXPECT_EQ(ann.welcomes[0].further_address_size(), 0);
+  EXPECT_EQ(ann.welcomes[0].participant(), 0u);
+}
+
+TEST_F(Broadcast, a_frame_goes_out_once_for_all_and_as_a_difference) {
+  for (int i = 0; i < 3; ++i) come();
+  bus_.sent_bytes = 0;
+  publish(300);
+  const auto large = std::exchange(bus_.sent_bytes, 0);
+  publish(5);
+  const auto first = std::exchange(bus_.sent_bytes, 0);
+  EXPECT_LT(first, large / 2);
+  for (int i = 0; i < 5; ++i) come();
+  bus_.sent_bytes = 0;
+  publish(5);
+  EXPECT_NEAR(static_cast<double>(bus_.sent_bytes), static_cast<double>(first), 100);
+}
+
+TEST_F(Broadcast, frames_are_left_out_while_the_bus_is_busy_and_the_rest_is_not) {
+  auto& ann = come();
+  const auto before = ann.crc();
+  bus_.waiting_bytes = Publisher::kBusyBytes + 1;
+  publish(5);
+  publish(5, true);
+  EXPECT_FALSE(ann.copy->has_frame()) << "of the surface as it is told now";
+  EXPECT_NE(before, newest_crc_);
+  bus_.waiting_bytes = 0;
+  publish(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.tap.counters().asks, 1u);
+}
+
+TEST_F(Broadcast, pieces_are_as_small_as_the_bus_wants_them) {
+  bus_.most_bytes = 200;
+  publish(50);
+  auto& ann = come();
+  publish(50, true);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.tap.counters().asks, 1u);
+}
+
+TEST_F(Broadcast, something_left_out_is_noticed_and_asked_for) {
+  auto& ann = come();
+  bus_.lost_subjects = {Subjects(kName).stream};
+  publish(5);
+  publish(5, true);
+  bus_.lost_subjects.clear();
+  pass(0.6);
+  EXPECT_EQ(ann.crc(), newest_crc_) << "by a sign of life";
+  EXPECT_EQ(ann.tap.counters().gaps, 1u);
+  EXPECT_EQ(ann.welcomes.size(), 2u);
+  EXPECT_EQ(ann.losses, 0) << "nobody is told of that";
+  publish(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+}
+
+TEST_F(Broadcast, what_is_told_while_an_answer_is_on_its_way_is_not_missed) {
+  auto& ann = come();
+  pass(1);
+  Envelope question;
+  question.mutable_keyframe_request();
+  for (const auto& listener : bus_.listeners)
+    if (Subjects(kName).is_for_answers(listener.subject)) bus_.late_subjects = {listener.subject};
+  ann.tap.say(question);  // as a relay does whose frames do not fit
+  EXPECT_EQ(ann.tap.counters().asks, 2u);
+  const auto asked = std::move(bus_.letters.front());
+  bus_.letters.pop_front();
+  for (const auto& listener : bus_.listeners)
+    if (listener.subject == asked.subject) listener.take(asked.bytes, asked.answer_to);
+  make(5, true);
+  first_.pass_on();  // the answer was made before, and comes after
+  bus_.deliver();
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.welcomes.size(), 2u);
+  publish(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.tap.counters().asks, 2u);
+}
+
+TEST_F(Broadcast, a_publisher_that_has_lost_its_server_is_silent_and_goes_on_later) {
+  auto& ann = come();
+  first_.upstream.is_welcome = false;
+  pass(2.9);
+  EXPECT_EQ(ann.losses, 0);
+  pass(0.5);
+  EXPECT_EQ(ann.losses, 1) << "the picture stands still";
+  EXPECT_FALSE(ann.tap.is_welcome());
+  pass(60);
+  EXPECT_TRUE(ann.over.empty());
+  EXPECT_LT(ann.tap.counters().asks, 25u) << "it asks less often with time";
+  make(5);
+  first_.join("Relay 2");
+  pass(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.tap.returns(), 1u);
+  EXPECT_TRUE(ann.tap.is_welcome());
+}
+
+TEST_F(Broadcast, what_was_told_in_a_short_silence_is_asked_for) {
+  auto& ann = come();
+  first_.upstream.is_welcome = false;
+  pass(0.2);
+  make(5);
+  first_.pass_on();
+  first_.upstream.is_welcome = true;
+  pass(0.6);
+  EXPECT_EQ(ann.tap.counters().gaps, 1u);
+  publish(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.losses, 0);
+}
+
+TEST_F(Broadcast, of_several_publishers_one_publishes_and_the_next_takes_over) {
+  auto& ann = come();
+  others_.push_back(make_source(50));
+  make(5);
+  first_.pass_on();
+  others_[0]->join("Second");
+  bus_.sent_bytes = 0;
+  pass(5);
+  EXPECT_EQ(ann.losses, 0);
+  const auto heard = ann.tap.counters();
+  EXPECT_EQ(heard.asks, 1u) << "the first one goes on";
+  first_.upstream.is_welcome = false;  // it dies
+  pass(4);
+  EXPECT_EQ(ann.losses, 1);
+  pass(4);
+  make(5);
+  others_[0]->pass_on();
+  bus_.deliver();
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_TRUE(ann.tap.is_welcome());
+}
+
+TEST_F(Broadcast, of_two_publishers_that_began_at_once_the_smaller_number_goes_on) {
+  others_.push_back(make_source(50));
+  make(5);
+  first_.pass_on();
+  others_[0]->join("Second");
+  bus_.lost_subjects = {Subjects(kName).stream};  // neither hears the other
+  pass(3);
+  bus_.lost_subjects.clear();
+  pass(1);
+  auto& ann = come();
+  make(5);
+  others_[0]->pass_on();
+  bus_.deliver();
+  EXPECT_EQ(ann.crc(), newest_crc_) << "without what the first one hears";
+}
+
+TEST_F(Broadcast, after_the_bus_was_away_one_of_several_publishes) {
+  auto& ann = come();
+  others_.push_back(make_source(50));
+  make(5);
+  first_.pass_on();
+  others_[0]->join("Second");
+  pass(1);
+  bus_.most_bytes = 0;
+  pass(10);
+  EXPECT_EQ(ann.losses, 1);
+  bus_.most_bytes = 1000;
+  bus_.sent_bytes = 0;
+  pass(1.8);
+  EXPECT_LT(bus_.sent_bytes, 500u) << "questions alone, while they listen";
+  pass(8);
+  EXPECT_TRUE(ann.tap.is_welcome());
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.losses, 1);
+}
+
+TEST_F(Broadcast, another_publisher_changes_nothing_for_who_follows_one) {
+  auto& ann = come();
+  FakeChannel eve(bus_);
+  const Subjects subjects(kName);
+  Envelope goodbye;
+  goodbye.mutable_goodbye()->set_text("over");
+  const auto framed = wire::encode_envelope(goodbye);
+  for (const std::uint64_t number : {0u, 1u, 2u, 50u})
+    for (const auto& piece : cut(700, number, *framed, 1000)) eve.send(subjects.stream, piece, "");
+  bus_.deliver();
+  EXPECT_TRUE(ann.over.empty());
+  publish(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_EQ(ann.tap.counters().asks, 1u);
+}
+
+TEST_F(Broadcast, nonsense_with_the_publishers_number_is_got_over) {
+  auto& ann = come();
+  FakeChannel eve(bus_);
+  const Subjects subjects(kName);
+  testing::Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    Bytes content(1 + random.below(60));
+    for (auto& byte : content) byte = static_cast<std::uint8_t>(random.below(256));
+    const Piece piece{.publisher = 100,
+                      .number = random.below(40),
+                      .piece = static_cast<std::uint32_t>(random.below(2)),
+                      .pieces = static_cast<std::uint32_t>(random.below(3)),
+                      .bytes = content};
+    auto bytes = write_piece(piece);
+    if (random.below(4) == 0) bytes.resize(random.below(static_cast<std::uint32_t>(bytes.size())));
+    for (const auto& listener : bus_.listeners)
+      if (random.below(3) == 0) eve.send(listener.subject, bytes, subjects.answers_to("abc"));
+    pass(0.1);
+  }
+  pass(10);
+  publish(5);
+  pass(5);
+  EXPECT_EQ(ann.crc(), newest_crc_);
+  EXPECT_GT(ann.tap.counters().wrong + ann.tap.counters().gaps, 0u);
+}
+
+TEST_F(Broadcast, answers_go_nowhere_else) {
+  FakeChannel eve(bus_);
+  bool is_heard = false;
+  ASSERT_TRUE(
+      eve.listen("trocar.hall.a.request", [&](auto, const auto&) { is_heard = true; }).ok());
+  FakeChannel mallory(bus_);
+  Envelope question;
+  question.mutable_keyframe_request();
+  const auto asked = *wire::encode_envelope(question);
+  mallory.send(Subjects(kName).ask, asked, "trocar.hall.a.request");
+  mallory.send(Subjects(kName).ask, asked, "");
+  bus_.deliver();
+  EXPECT_FALSE(is_heard);
+  bus_.sent_bytes = 0;
+  for (int i = 0; i < 1000; ++i)
+    mallory.send(Subjects(kName).ask, asked, Subjects(kName).answers_to("ab"));
+  const auto questions = std::exchange(bus_.sent_bytes, 0);
+  EXPECT_GT(questions, 0u);
+  bus_.deliver();
+  const auto flood = std::exchange(bus_.sent_bytes, 0);
+  now_ns_ += 60'000'000'000;
+  first_.publisher.attend();
+  mallory.send(Subjects(kName).ask, asked, Subjects(kName).answers_to("ab"));
+  bus_.deliver();
+  EXPECT_LE(flood, 400 * bus_.sent_bytes) << "so many are answered at once, and no more";
+}
+
+TEST_F(Broadcast, the_server_knows_how_many_watch_everywhere) {
+  Envelope own;
+  own.mutable_relay_report()->set_watchers(3);
+  first_.publisher.say(own);
+  ASSERT_FALSE(first_.upstream.said.empty());
+  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), 3u);
+  auto& ann = come();
+  auto& ben = come();
+  for (auto* taker : {&ann, &ben}) {
+    Envelope report;
+    report.mutable_relay_report()->set_watchers(20);
+    taker->tap.say(report);
+  }
+  pass(2);
+  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), 43u);
+  takers_.pop_back();
+  pass(12);
+  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), 23u);
+  EXPECT_LE(first_.upstream.said.size(), 4u) << "it is said when it changes";
+}
+
+TEST_F(Broadcast, the_servers_clock_is_known_over_the_bus) {
+  auto& ann = come();
+  EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), 0u) << "not yet";
+  pass(1);
+  EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), now_ns_ / 1000 + 5000);
+}
+
+TEST_F(Broadcast, the_end_of_the_session_is_the_end_for_all) {
+  auto& ann = come();
+  const auto last = session_.make_frame(10);
+  session_.on_io([&] { session_.replicator().begin_barrier(last); });
+  first_.pass_on();
+  const auto barrier = first_.client->receive(Envelope::kBarrier);
+  ASSERT_TRUE(barrier);
+  first_.say(*barrier);
+  bus_.deliver();
+  EXPECT_EQ(ann.copy->last_frame(), last->frame);
+  EXPECT_EQ(ann.crc(), barrier->barrier().surface_crc());
+  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  bus_.deliver();
+  EXPECT_EQ(ann.over, "it is over");
+}
+
+TEST_F(Broadcast, a_relay_that_is_put_out_ends_nothing_for_others) {
+  auto& ann = come();
+  first_.upstream.events.over(replication::EndReason::PutOut, "an instructor has put you out");
+  bus_.deliver();
+  EXPECT_TRUE(ann.over.empty());
+}
+
+TEST_F(Broadcast, who_finds_nobody_says_so) {
+  first_.upstream.is_welcome = false;
+  pass(1);
+  auto& ann = come();
+  pass(14);
+  EXPECT_TRUE(ann.over.empty());
+  pass(2);
+  EXPECT_NE(ann.over.find("nobody publishes the session monday"), std::string::npos) << ann.over;
+}
+
+}  // namespace
+}  // namespace trocar::broadcast
