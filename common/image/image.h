@@ -28,7 +28,7 @@ struct Image {
 };
 
 // Error: the file is neither PNG nor JPEG, has more than kMostSide along a side, takes or unpacks
-// to more than 64 MiB, or is a JPEG of more than 100 scans.
+// to more than 64 MiB, or is a JPEG of more than 100 scans, 1,000 tables or 256 codes in a table.
 Result<Image> decode(std::string_view file);
 
 }  // namespace trocar::image

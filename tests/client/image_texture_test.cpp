@@ -6,8 +6,11 @@
 
 #include <fstream>
 #include <iterator>
+#include <string>
+#include <vector>
 
 #include "client/render/gl_context.h"
+#include "common/image/image.h"
 #include "common/lesson/lesson_texts.h"
 #include "tests/support/files.h"
 
@@ -100,18 +103,64 @@ TEST_F(ImageTextureTest, WhatUnpacksToTooMuchIsRefused) {
   EXPECT_EQ(texture.name(), 0u);
 }
 
-TEST_F(ImageTextureTest, JpegOfManyScansIsRefused) {
-  std::string jpeg;
+std::string a_jpeg() {
   for (const auto& picture : lesson::lesson_pictures())
-    if (picture.bytes.starts_with("\xff\xd8")) jpeg = picture.bytes;
-  ASSERT_FALSE(jpeg.empty());
+    if (picture.bytes.starts_with("\xff\xd8")) return std::string(picture.bytes);
+  ADD_FAILURE() << "no lesson has a JPEG";
+  return {};
+}
+
+TEST_F(ImageTextureTest, JpegWithATableOfTooManyCodesIsRefused) {
+  auto jpeg = a_jpeg();
+  const auto table = jpeg.find("\xff\xc4");
+  ASSERT_NE(table, std::string::npos);
+  ImageTexture texture;
+  EXPECT_TRUE(texture.load(jpeg));
+  jpeg[table + 5 + 14] = jpeg[table + 5 + 15] = '\xff';  // of 15 and 16 bits
+  const Status loaded = texture.load(jpeg);
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().message,
+            "picture: a JPEG with a table of more than 256 codes, or too many tables");
+}
+
+// Whatever was in the memory before, a table that is not in the file is empty.
+TEST(Image, ATableThatIsMissingIsEmpty) {
+  std::ifstream in(
+      std::string(TROCAR_SOURCE_DIR) + "/tests/fuzz/seeds/image/table_that_is_missing.jpg",
+      std::ios::binary);
+  const std::string file{std::istreambuf_iterator<char>(in), {}};
+  const auto pixels_after = [&](char left) {
+    std::vector<std::string> blocks;
+    for (std::size_t bytes = 8000; bytes < 28'000; bytes += 500) blocks.emplace_back(bytes, left);
+    blocks.clear();
+    const auto image = image::decode(file);
+    return image.ok() ? image->pixels : std::vector<image::Pixel>{};
+  };
+  const auto first = pixels_after('\0');
+  for (const char left : {'\x55', '\xff', '\7'}) EXPECT_EQ(pixels_after(left), first);
+}
+
+TEST_F(ImageTextureTest, AnErrorIsOneLineWhateverTheFileSays) {
+  auto png = png_of(2, 1);
+  png.replace(png.find("IDAT"), 4, "I\nA\x1b");
+  ImageTexture texture;
+  const Status loaded = texture.load(png);
+  ASSERT_FALSE(loaded);
+  for (const char c : loaded.error().message) EXPECT_GE(c, ' ');
+}
+
+TEST_F(ImageTextureTest, JpegOfManyScansIsRefused) {
+  const auto jpeg = a_jpeg();
   const auto scan = jpeg.find("\xff\xda"), end = jpeg.rfind("\xff\xd9");
   std::string many = jpeg.substr(0, end);
   for (int i = 0; i < 100; ++i) many += jpeg.substr(scan, end - scan);
   ImageTexture texture;
-  const Status loaded = texture.load(many + jpeg.substr(end));
-  ASSERT_FALSE(loaded);
-  EXPECT_NE(loaded.error().message.find("more than 100 scans"), std::string::npos);
+  // Bytes of 0xff may come before a marker (B.1.1.2), the first one too.
+  for (const std::string before : {"", "\xff"}) {
+    const Status loaded = texture.load(before + many + jpeg.substr(end));
+    ASSERT_FALSE(loaded);
+    EXPECT_NE(loaded.error().message.find("more than 100 scans"), std::string::npos);
+  }
 }
 
 }  // namespace
