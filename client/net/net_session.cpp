@@ -16,8 +16,7 @@
 namespace trocar::net {
 namespace {
 
-// A busy server is given time to read the Bye: who ends before that resets the connection, and the
-// place is kept as if it were lost.
+// A busy server reads the Bye late, and never from who has reset the connection by ending.
 constexpr std::chrono::milliseconds kCloseDeadline{2000};
 // How soon a full inbound queue is looked at again: well below one frame.
 constexpr std::chrono::milliseconds kRoomRetry{2};

@@ -107,7 +107,7 @@ TEST(Return, a_broken_connection_comes_back_to_the_same_place_with_a_new_keyfram
   EXPECT_TRUE(session.wait_for_sessions(0));
 }
 
-// What the server writes to who has ended resets the connection, with the Bye that it has not read.
+// A server that writes to who has ended gets a reset, and never reads the Bye before it.
 TEST(Return, who_leaves_a_busy_server_leaves_no_place_behind) {
   GuardedSession guarded;
   auto& session = *guarded.session;
