@@ -273,7 +273,10 @@ Bus::~Bus() {
   if (parts_->connection != nullptr)
     natsConnection_FlushTimeout(parts_->connection, kFlushTimeoutMs);
   parts_->drop();
-  nats_CloseAndWait(kEndTimeoutMs);
+  if (nats_CloseAndWait(kEndTimeoutMs) == NATS_TIMEOUT) {
+    log::warn("NATS: a thread of the library does not end");
+    (void)parts_.release();  // that thread may still use it
+  }
   // At the end of the process a closed library frees what OpenSSL frees once more (libnats 3.4.1,
   // with TLS). An open one leaves it alone.
   nats_Open(-1);
@@ -285,12 +288,18 @@ Result<std::unique_ptr<Bus>> Bus::connect(const BusPlace& place, const std::stri
   auto parts = std::make_unique<Parts>();
   parts->place = place;
   if (const auto made = parts->make_options(name); !made) return made.error();
-  const auto opened = parts->open(parts->connection);
+  natsConnection* made = nullptr;
+  auto opened = parts->open(made);
+  if (opened) opened = parts->use(made);
   if (!opened && (!is_patient || opened.error().code != ErrorCode::ResourceMissing))
     return opened.error();
   if (!opened) parts->trouble.say(opened.error().message + ": trying again");
   if (is_patient) {
-    parts->is_gone = !opened || natsConnection_IsClosed(parts->connection);
+    {
+      // One that has ended before it was in use has told nobody.
+      const std::lock_guard guard(parts->keeper_lock);
+      parts->is_gone |= !opened || natsConnection_IsClosed(made);
+    }
     parts->keeper =
         std::jthread([kept = parts.get()](const std::stop_token& stop) { kept->keep(stop); });
   }

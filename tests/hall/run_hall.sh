@@ -259,6 +259,26 @@ test_found() {
   "$bin/trocar-journal" verify recordings/*-two/session-2.mcap >verified || fail "$(cat verified)"
 }
 
+# An authority that the machine trusts, and a program with its certificate that writes down what it is sent.
+certificates() {
+  openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=ours -keyout ca.key -out ca.pem 2>/dev/null
+  openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=localhost -keyout other.key -out other.csr 2>/dev/null
+  printf 'subjectAltName=DNS:localhost\n' >other.ext
+  openssl x509 -req -in other.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 2 -extfile other.ext -out other.pem 2>/dev/null
+  local port=$((base + 9)) wait
+  openssl s_server -quiet -accept 127.0.0.1:$port -cert other.pem -key other.key < <(sleep 60) >heard 2>openssl.log &
+  children+=($!)
+  for wait in $(seq 100); do (exec 4<>"/dev/tcp/127.0.0.1/$port") 2>/dev/null && break; sleep 0.05; done
+  refused 4 'another certificate' list --at https://localhost:$port --certificate $certificate --key hall.key
+  SSL_CERT_FILE=ca.pem refused 4 'of another host' list --at https://127.0.0.1:$port --key hall.key
+  [ ! -s heard ] || fail "it was sent to who cannot show the certificate: $(cat heard)"
+  # Who may be trusted is asked, with the key; it never answers.
+  (SSL_CERT_FILE=ca.pem ask list --at https://localhost:$port --key hall.key >said 2>&1 || true) &
+  children+=($!)
+  for wait in $(seq 100); do grep -q "Bearer $(cat hall.key)" heard && return; sleep 0.05; done
+  fail "it was not asked: $(cat said openssl.log)"
+}
+
 test_tls() {
   configure 'cores = 100' 'tls = true' "$lattice"
   "$bin/trocar-hall" --config hall.toml --check-config | grep -q fine || fail "the file is not fine"
@@ -284,6 +304,9 @@ test_tls() {
   refused 5 'no hall answers' list --at "$plain"
   refused 3 'holds no certificate' list --at "$at" --certificate hall.key
   refused 2 'give --at https://' list --at "$plain" --certificate $certificate
+  # The key goes to nobody who cannot show the certificate, and to no other machine in the open.
+  refused 2 'give --at https://' list --at 192.0.2.2:7694 --key hall.key
+  if command -v openssl >/dev/null; then certificates; fi
   cp $certificate before.crt
   kill -KILL $hall
   wait $hall || true

@@ -111,14 +111,35 @@ TEST_F(Embed, OneThatIsElsewhereIsRefusedWithThePlace) {
   const auto fine = embed(raw, organ_.mesh, options_of(offset_));
   ASSERT_FALSE(fine.ok());
   EXPECT_NE(fine.error().message.find("fine.obj: the vertex at "), std::string::npos);
-  EXPECT_NE(fine.error().message.find("mm from the surface of the mesh, may be"),
-            std::string::npos);
+  EXPECT_NE(fine.error().message.find("mm from the surface of the mesh, and"), std::string::npos);
   // The file's first faces have more corners than three.
   for (auto& number : raw.face_numbers) number = 7;
   const auto other_unit = embed(raw, organ_.mesh, {.offset_m = offset_, .name = "fine.obj"});
   ASSERT_FALSE(other_unit.ok());
   EXPECT_NE(other_unit.error().message.find("fine.obj: face 7: "), std::string::npos);
   EXPECT_NE(other_unit.error().message.find("same unit"), std::string::npos);
+}
+
+// A rim that is thinner than the lattice is not in a mesh made from the same surface.
+TEST_F(Embed, AFewVerticesMayBeFartherAwayAndAreTold) {
+  auto raw = raw_of(organ_.mesh, offset_);
+  const auto corner = organ_.mesh.boundary_triangles[0][0].value;
+  const Vec3d p = organ_.mesh.rest_positions[corner];
+  const double edge =
+      length(organ_.mesh.rest_positions[organ_.mesh.boundary_triangles[0][1].value] - p);
+  raw.positions[corner] = raw.positions[corner] + p * (1e3 * edge / length(p));
+  const auto fine = embed(raw, organ_.mesh, options_of(offset_));
+  ASSERT_TRUE(fine.ok()) << fine.error().message;
+  ASSERT_EQ(fine->warnings.size(), 1u);
+  EXPECT_NE(fine->warnings[0].find("1 of "), std::string::npos) << fine->warnings[0];
+  // The same distance of a tenth of them is another place.
+  for (std::size_t t = 0; t < raw.triangles.size() / 10; ++t) {
+    auto& q = raw.positions[raw.triangles[t][0].value];
+    q = q + normalized(q * 1e-3 - offset_, Vec3d{}) * (1e3 * edge);
+  }
+  const auto moved = embed(raw, organ_.mesh, options_of(offset_));
+  ASSERT_FALSE(moved.ok());
+  EXPECT_NE(moved.error().message.find("is it the same organ"), std::string::npos);
 }
 
 TEST_F(Embed, TheOrgansFileKeepsItAndItsHashDoesNotKnowIt) {

@@ -60,10 +60,17 @@ TEST(ImportedSession, OfATetMeshVerifies) {
   expect_session({(trocar::testing::shared_folder() / "organs/liver_tiny.vtk").string()});
 }
 
+// It rides on the mesh that is made from it.
 TEST(ImportedSession, OfASurfaceVerifies) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/stomach_surface_mm.stl");
-  expect_session({(trocar::testing::shared_folder() / "organs/stomach_surface_mm.stl").string(),
-                  "--unit", "mm", "--nodes", "1000"});
+  const auto file = (trocar::testing::shared_folder() / "organs/stomach_surface_mm.stl").string();
+  expect_session({file, "--unit", "mm", "--nodes", "1000", "--embed", file});
+}
+
+TEST(ImportedSession, OfALiverUnderItsOwnSurfaceVerifies) {
+  TROCAR_SKIP_WITHOUT_SHARED("organs/liver_surface_mm.stl");
+  const auto file = (trocar::testing::shared_folder() / "organs/liver_surface_mm.stl").string();
+  expect_session({file, "--unit", "mm", "--nodes", "1500", "--embed", file});
 }
 
 // A block of 40 mm that the test writes itself.

@@ -13,6 +13,11 @@ namespace {
 
 constexpr std::chrono::seconds kPublishPeriod{2};
 
+// Nobody makes a hall say something elsewhere on the bus than to who asks.
+bool may_answer(const std::string& subject) {
+  return subject.starts_with("_INBOX.");
+}
+
 }  // namespace
 
 std::string request_subject(const std::string& hall_name) {
@@ -36,7 +41,7 @@ HallBus::HallBus(asio::io_context& context, HallServer& server, const std::strin
     : context_(context),
       server_(server),
       name_(hall_name(server.port())),
-      proofs_(name_, key, std::time(nullptr)),
+      proofs_(name_, key),
       timer_(context) {}
 
 Result<std::unique_ptr<HallBus>> HallBus::open(asio::io_context& context, HallServer& server,
@@ -59,7 +64,7 @@ Status HallBus::subscribe() {
         asio::post(context_, [this, alive, answer_to] {
           if (alive.expired()) return;
           --waiting_;
-          if (!answer_to.empty()) bus_->publish(answer_to, server_.directory(name_));
+          if (may_answer(answer_to)) bus_->publish(answer_to, directory());
         });
       });
   if (!heard) return heard;
@@ -69,9 +74,13 @@ Status HallBus::subscribe() {
                            asio::post(context_, [this, alive, text, answer_to] {
                              if (alive.expired()) return;
                              --waiting_;
-                             if (!answer_to.empty()) take_request(text, answer_to);
+                             if (may_answer(answer_to)) take_request(text, answer_to);
                            });
                          });
+}
+
+std::string HallBus::directory() const {
+  return server_.directory(name_, proofs_.start());
 }
 
 bool HallBus::may_wait() {
@@ -91,7 +100,7 @@ void HallBus::take_request(const std::string& text, const std::string& answer_to
 }
 
 void HallBus::publish_often() {
-  bus_->publish(kStateSubject, server_.directory(name_));
+  bus_->publish(kStateSubject, directory());
   timer_.expires_after(kPublishPeriod);
   timer_.async_wait([this](boost::system::error_code error) {
     if (!error && bus_) publish_often();

@@ -3,7 +3,8 @@
 // A hall on a bus: it says every two seconds what runs in it and what room is left, answers who
 // asks for that, and takes the requests of its HTTP port over the bus as well.
 //
-//   trocar.hall.state           published: a directory, as GET /sessions has it, with "hall"
+//   trocar.hall.state           published: a directory, as GET /sessions has it, with "hall" and
+//                               "start", a number that is another one after each start
 //   trocar.hall.directory       asked: every hall answers with its directory
 //   trocar.hall.NAME.request    asked: one hall answers (server/hall/proof/proof.h)
 //
@@ -45,6 +46,7 @@ class HallBus {
  private:
   HallBus(asio::io_context& context, HallServer& server, const std::string& key);
   Status subscribe();
+  std::string directory() const;
   // Takes one place of kMostWaiting; false: all are taken. Thread: any one.
   bool may_wait();
   void publish_often();

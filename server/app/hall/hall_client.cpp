@@ -50,7 +50,8 @@ Result<Json> HallClient::ask(const std::string& method, const std::string& path,
 
 Result<Json> BusHallClient::ask(const std::string& method, const std::string& path,
                                 const std::string& body, std::chrono::seconds deadline) const {
-  const auto request = hall::write_bus_request(name_, method, path, body, key_, std::time(nullptr));
+  const auto request =
+      hall::write_bus_request(name_, start_, method, path, body, key_, std::time(nullptr));
   const auto text = bus_.ask(request_subject(name_), request, deadline);
   if (!text) return text.error();
   const auto answer = Json::parse(*text, nullptr, false);

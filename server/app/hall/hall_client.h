@@ -48,16 +48,16 @@ class HallClient final : public HallConnection {
 
 class BusHallClient final : public HallConnection {
  public:
-  // `bus` outlives it. `name`: the hall's.
-  BusHallClient(bus::Bus& bus, std::string name, std::string key)
-      : bus_(bus), name_(std::move(name)), key_(std::move(key)) {}
+  // `bus` outlives it. `name` and `start`: the hall's, as its directory has them.
+  BusHallClient(bus::Bus& bus, std::string name, std::string start, std::string key)
+      : bus_(bus), name_(std::move(name)), start_(std::move(start)), key_(std::move(key)) {}
 
   Result<Json> ask(const std::string& method, const std::string& path, const std::string& body,
                    std::chrono::seconds deadline) const override;
 
  private:
   bus::Bus& bus_;
-  const std::string name_, key_;
+  const std::string name_, start_, key_;
 };
 
 }  // namespace trocar::app

@@ -9,6 +9,7 @@
 #include "common/base/json.h"
 #include "common/base/printable.h"
 #include "common/secure/certificate.h"
+#include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
 #include "server/app/hall/hall_bus.h"
 #include "server/app/hall/hall_client.h"
@@ -183,7 +184,7 @@ Status start_anywhere(bus::Bus& bus, const std::vector<Json>& halls, const HallO
   for (const auto& hall : halls) {
     if (!may_start(hall, options.what)) continue;
     const auto name = word(hall, "hall");
-    const BusHallClient client(bus, name, key);
+    const BusHallClient client(bus, name, word(hall, "start"), key);
     auto asked = ask_to_start(client, options);
     // Only a hall that has said no has certainly started nothing: then the next one is asked.
     const bool is_refused = !asked && asked.error().code == ErrorCode::Refused;
@@ -197,16 +198,17 @@ Status start_anywhere(bus::Bus& bus, const std::vector<Json>& halls, const HallO
 
 Status end_anywhere(bus::Bus& bus, const std::vector<Json>& halls, const std::string& name,
                     const std::string& key) {
-  std::vector<std::string> with_it;
-  for (const auto& hall : halls)
-    if (has_session(hall, name)) with_it.push_back(word(hall, "hall"));
+  std::vector<Json> with_it;
+  std::ranges::copy_if(halls, std::back_inserter(with_it),
+                       [&](const Json& hall) { return has_session(hall, name); });
   if (with_it.empty())
     return Error{ErrorCode::Refused,
                  printable(name, 64) + ": no hall that answers has such a session"};
   if (with_it.size() > 1)
-    return Error{ErrorCode::Refused, name + ": " + with_it[0] + " and " + with_it[1] +
+    return Error{ErrorCode::Refused, name + ": " + word(with_it[0], "hall") + " and " +
+                                         word(with_it[1], "hall") +
                                          " both have such a session, end it with --at HOST:PORT"};
-  return end(BusHallClient(bus, with_it[0], key), name);
+  return end(BusHallClient(bus, word(with_it[0], "hall"), word(with_it[0], "start"), key), name);
 }
 
 Status run_on_bus(const HallOptions& options, const std::string& key) {
@@ -229,6 +231,11 @@ Status run_hall_command(const HallOptions& options) {
     key = std::move(*read);
   }
   if (!options.nats.url.empty()) return run_on_bus(options, key);
+  const bool is_here = options.host == "localhost" || secure::is_loopback(options.host);
+  if (!key.empty() && !options.has_tls && !is_here && !options.sends_openly)
+    return Error{ErrorCode::Usage,
+                 "--key: others could read it on its way to " + options.host +
+                     ": give --at https://HOST:PORT, or --without-tls where you trust the network"};
   Bytes certificate_der;
   if (!options.certificate_file.empty()) {
     const auto text = secure::read_small_file(options.certificate_file);

@@ -314,9 +314,10 @@ void HallServer::answer(const hall::BusRequest& request, hall::Proof proof,
                  [core = core_](std::exception_ptr failure) { rethrow(failure); });
 }
 
-std::string HallServer::directory(const std::string& hall_name) const {
+std::string HallServer::directory(const std::string& hall_name, const std::string& start) const {
   auto json = core_->directory(false);
   json["hall"] = hall_name;
+  json["start"] = start;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

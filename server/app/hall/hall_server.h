@@ -12,7 +12,8 @@
 // What changes something needs "Authorization: Bearer KEY". Errors are {"error": "one line"}.
 //
 // Bounds: kMostConnections at a time, one request each, kMostHeadBytes and kMostRequestBytes of it
-// within kRequestDeadline. A wrong key is answered after kWrongKeyDelay.
+// within kRequestDeadline, with TLS after as long for the handshake. A wrong key is answered after
+// kWrongKeyDelay.
 //
 // Thread: the one that runs the I/O context.
 
@@ -55,8 +56,9 @@ class HallServer {
   // "status", a number, and "body", a text, once. Wrong proofs are noted once a second at most.
   void answer(const hall::BusRequest& request, hall::Proof proof,
               std::function<void(const std::string&)> answer);
-  // Returns what GET /sessions says to who has no key, with the hall's name.
-  std::string directory(const std::string& hall_name) const;
+  // Returns what GET /sessions says to who has no key, with the hall's name and number of its
+  // start.
+  std::string directory(const std::string& hall_name, const std::string& start) const;
 
  private:
   struct Core;

@@ -47,6 +47,8 @@ void add_command_options(CLI::App& command, HallOptions& options) {
                   "the certificate that the hall has to show (PEM) [one that this machine trusts, "
                   "of this host]")
       ->type_name("FILE");
+  command.add_flag("--without-tls", options.sends_openly,
+                   "send the key to another machine where others can read it on its way");
   add_nats_options(command, options.nats, "ask all halls of this NATS instead");
   command.add_option("--key", options.key_file, "file with the hall's key")->type_name("FILE");
 }

@@ -22,6 +22,7 @@ struct HallOptions {
   std::string at = "127.0.0.1:7694", host;
   std::uint16_t port = 0;        // of `at`
   bool has_tls = false;          // likewise
+  bool sends_openly = false;     // the key, to another machine
   std::string certificate_file;  // what the hall has to show; empty: what this machine trusts
   std::string key_file;          // empty: without a key
   std::string what;              // the lesson to start, the session to end

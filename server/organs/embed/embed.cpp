@@ -104,33 +104,42 @@ Vec3d turned(surface::Axes from, surface::Axes to, const Vec3d& p) {
 // Compares with the mesh: how far away, and which way it looks.
 Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine& result) {
   const surface::TriangleTree tree(mesh.rest_positions, mesh.boundary_triangles);
-  const double most = kMostEdgesAway * mean_edge(mesh);
+  const double edge = mean_edge(mesh), most = kMostEdgesAway * edge;
   auto& surface = result.surface;
   std::vector<Vec3d> outward;
   Vec3d worst;
+  std::size_t beyond = 0;
   for (std::uint32_t v = 0; v < surface.quanta.size(); ++v) {
     const Vec3d p = position(surface, v);
     const auto near = tree.nearest(p);
-    if (const double away = std::sqrt(near.distance_squared); away > result.farthest_m)
-      result.farthest_m = away, worst = p;
+    const double away = std::sqrt(near.distance_squared);
+    beyond += away > most;
+    if (away > result.farthest_m) result.farthest_m = away, worst = p;
     const auto& t = mesh.boundary_triangles[near.triangle];
     const Vec3d a = mesh.rest_positions[t[0].value];
     outward.push_back(
         cross(mesh.rest_positions[t[1].value] - a, mesh.rest_positions[t[2].value] - a));
   }
-  if (result.farthest_m > most) {
+  const double share = static_cast<double>(beyond) / static_cast<double>(surface.quanta.size());
+  if (share > kMostBeyond || result.farthest_m > kMostEdgesBeyond * edge) {
     const auto in_file = [&](double c) {
       return std::round(c / options.unit_m * 1e6) / 1e6 + 0.0;  // no minus before zero
     };
     const Vec3d place = turned(options.organ_axes, options.axes, worst + options.offset_m);
     return bad(options,
                fmt::format("the vertex at {:.5g} {:.5g} {:.5g} is {:.2f} mm from the surface of "
-                           "the mesh, may be {:.2f} mm, half of its mean edge: is it the same "
-                           "organ, in the same unit and place? A mesh that is finer or coarser "
-                           "fits otherwise (--nodes)",
+                           "the mesh, and {} of {} vertices are more than {:.2f} mm, half of its "
+                           "mean edge: is it the same organ, in the same unit and place? A mesh "
+                           "that is finer or coarser fits otherwise (--nodes)",
                            in_file(place.x), in_file(place.y), in_file(place.z),
-                           1e3 * result.farthest_m, 1e3 * most));
+                           1e3 * result.farthest_m, beyond, surface.quanta.size(), 1e3 * most));
   }
+  if (beyond > 0)
+    result.warnings.push_back(fmt::format(
+        "{} of {} vertices are more than {:.2f} mm from the surface of the mesh, {:.2f} "
+        "mm at most: it lacks what is so thin, which rides on what is nearest and is "
+        "not felt",
+        beyond, surface.quanta.size(), 1e3 * most, 1e3 * result.farthest_m));
   double agrees = 0;
   for (const auto& t : surface.triangles) agrees += dot(normal(surface, t), outward[t[0]]);
   if (agrees < 0) {

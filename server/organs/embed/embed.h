@@ -3,10 +3,11 @@
 // A fine surface for an organ, from the triangles of a file (common/wire/fine_surface.h says what
 // it is for). It need not be closed: it is drawn, and nothing is computed of it.
 //
-// Each vertex must be near the surface of the organ's mesh, by which clients move it: at most half
-// of the mean edge there. Repaired, with a warning: triangles that repeat a corner or have no area
-// are dropped, vertices at the same place and with the same place in a picture are welded, those of
-// no triangle that is kept are dropped, and a surface that looks inward is turned.
+// The vertices must be near the surface of the organ's mesh, by which clients move them: within
+// half of its mean edge. A thin rim that the mesh does not have is left to ride on what is nearest,
+// with a warning. Repaired, with a warning: triangles that repeat a corner or have no area are
+// dropped, vertices at the same place and with the same place in a picture are welded, those of no
+// triangle that is kept are dropped, and a surface that looks inward is turned.
 
 #include <span>
 #include <string>
@@ -20,7 +21,9 @@
 
 namespace trocar::embed {
 
-inline constexpr double kMostEdgesAway = 0.5;  // of the mean edge of the mesh's surface
+// Of the mean edge of the mesh's surface: how far vertices are, and the share kMostBeyond of them.
+inline constexpr double kMostEdgesAway = 0.5, kMostEdgesBeyond = 2;
+inline constexpr double kMostBeyond = 0.05;
 
 struct EmbedOptions {
   double unit_m = 1;  // of the file's numbers
@@ -38,7 +41,8 @@ struct EmbeddedFine {
   std::vector<std::string> warnings;  // one line each
 };
 
-// `mesh`: the organ's, with its boundary. Error: a vertex is too far away, which names the place;
+// `mesh`: the organ's, with its boundary. Error: more than kMostBeyond of the vertices are too
+// far away, or one by more than kMostEdgesBeyond, which names the place;
 // limits of wire::FineSurface; a picture larger than wire::kMostFinePictureSide, or whose header
 // does not tell its size; places in a picture that are wrong; there is nothing to embed.
 Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& mesh,

@@ -4,6 +4,7 @@
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/host_name_verification.hpp>
 #include <boost/asio/this_coro.hpp>
@@ -31,7 +32,9 @@ Error trouble(const boost::system::error_code& error) {
 http::request<http::string_body> request_of(const HttpQuestion& question) {
   http::request<http::string_body> request(http::string_to_verb(question.method), question.path,
                                            kHttpVersion);
-  request.set(http::field::host, question.host);
+  const bool is_ipv6 = question.host.find(':') != std::string::npos;
+  request.set(http::field::host, (is_ipv6 ? "[" + question.host + "]" : question.host) + ":" +
+                                     std::to_string(question.port));
   request.set(http::field::content_type, "application/json");
   if (!question.key.empty()) request.set(http::field::authorization, "Bearer " + question.key);
   request.body() = question.body;
@@ -57,10 +60,12 @@ asio::awaitable<Status> begin_tls(beast::ssl_stream<beast::tcp_stream>& stream,
   if (!is_pinned)
     stream.set_verify_callback(asio::ssl::host_name_verification(question.host), unset);
   if (unset) co_return trouble(unset);
-  // It fails for addresses, which no server name may be.
-  SSL_set_tlsext_host_name(stream.native_handle(), question.host.c_str());
+  asio::ip::make_address(question.host, unset);
+  const bool is_name = unset.failed();  // no address may be a server's name (RFC 6066, 3)
+  if (is_name && SSL_set_tlsext_host_name(stream.native_handle(), question.host.c_str()) != 1)
+    co_return Error{ErrorCode::ResourceMissing, "the host's name is too long"};
   const auto [failed] = co_await stream.async_handshake(asio::ssl::stream_base::client, kNoThrow);
-  if (failed && SSL_get_verify_result(stream.native_handle()) != X509_V_OK)
+  if (failed && !is_pinned && SSL_get_verify_result(stream.native_handle()) != X509_V_OK)
     co_return Error{ErrorCode::Refused,
                     "nobody whom this machine trusts vouches for its certificate, or that is of "
                     "another host"};
