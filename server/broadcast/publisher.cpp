@@ -19,8 +19,9 @@ constexpr std::uint64_t kTakeOverNs = 2'000'000'000, kTakerNs = 10'000'000'000;
 constexpr std::uint64_t kReportNs = 1'100'000'000;         // the server takes one in a second
 constexpr std::size_t kMostAnswerBytes = 8 * 1024 * 1024;  // that wait when another is begun
 constexpr std::size_t kMostAskBytes = 4096;
-constexpr double kMostAnswersPerSecond = 20;
 constexpr std::uint32_t kMostWatchersThere = 100'000;
+constexpr double kMostAnswersPerSecond = 20;
+constexpr std::uint64_t kAnswerPauseNs = 250'000'000;  // from one to the next for the same asker
 
 std::uint64_t random_number() {
   std::uint64_t number = 0;
@@ -207,9 +208,12 @@ void Publisher::take_ask(BytesView bytes, const std::string& answer_to) {
 
 // The picture in it is the one that the next difference is based on.
 void Publisher::answer_all(const std::string& answer_to) {
+  const auto now = options_.clock_ns();
+  std::erase_if(answered_, [&](const auto& one) { return now - one.second >= kAnswerPauseNs; });
   if (!welcome_ || !copy_->has_frame() || channel_->waiting_bytes() > kMostAnswerBytes ||
-      !answers_.take(1, options_.clock_ns()))
+      answered_.contains(answer_to) || !answers_.take_if_left(1, now))
     return;
+  answered_[answer_to] = now;
   if (published_ != copy_->frame()) publish_frame(copy_->state());
   if (answer_.empty() || answer_number_ != number_) {
     std::vector<wire::SharedBytes> all{welcome_};

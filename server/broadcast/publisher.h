@@ -111,6 +111,7 @@ class Publisher final : public relay::Upstream {
   bool was_active_ = false;              // as attend() has found it
   bool is_waiting_ = false;              // for another publisher, and the log says so
   std::map<std::string, Taker> takers_;  // by the subject for answers to them
+  std::map<std::string, std::uint64_t> answered_;  // when, by that subject, of the last 0.25 s
   std::optional<std::uint32_t> own_watchers_, reported_;
   std::uint64_t reported_ns_ = 0;
 };
