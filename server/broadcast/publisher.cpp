@@ -19,7 +19,6 @@ constexpr std::uint64_t kTakeOverNs = 2'000'000'000, kTakerNs = 10'000'000'000;
 constexpr std::uint64_t kReportNs = 1'100'000'000;         // the server takes one in a second
 constexpr std::size_t kMostAnswerBytes = 8 * 1024 * 1024;  // that wait when another is begun
 constexpr std::size_t kMostAskBytes = 4096;
-constexpr std::uint32_t kMostWatchersThere = 100'000;
 constexpr double kMostAnswersPerSecond = 20;
 constexpr std::uint64_t kAnswerPauseNs = 250'000'000;  // from one to the next for the same asker
 
@@ -237,15 +236,17 @@ void Publisher::say(const proto::Envelope& message) {
 
 void Publisher::note_taker(const std::string& taker, std::uint32_t watchers) {
   if (takers_.size() >= kMostTakers && !takers_.contains(taker)) return;
-  takers_[taker] = {std::min(watchers, kMostWatchersThere), options_.clock_ns()};
+  takers_[taker] = {watchers, options_.clock_ns()};
 }
 
 void Publisher::report() {
   const auto now = options_.clock_ns();
   std::erase_if(takers_, [&](const auto& one) { return now - one.second.heard_ns > kTakerNs; });
   if (!own_watchers_ || !upstream_->is_welcome() || now - reported_ns_ < kReportNs) return;
-  auto watchers = *own_watchers_;
-  for (const auto& [name, taker] : takers_) watchers += taker.watchers;
+  std::uint64_t sum = *own_watchers_;
+  for (const auto& [name, taker] : takers_) sum += taker.watchers;
+  const auto watchers =
+      static_cast<std::uint32_t>(std::min(sum, std::uint64_t{replication::kMostRelayed}));
   if (reported_ == watchers) return;
   reported_ = watchers;
   reported_ns_ = now;

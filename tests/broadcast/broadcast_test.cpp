@@ -475,6 +475,21 @@ TEST_F(Broadcast, the_server_knows_how_many_watch_everywhere) {
   EXPECT_LE(first_.upstream.said.size(), 4u) << "it is said when it changes";
 }
 
+TEST_F(Broadcast, more_than_the_server_takes_are_never_reported) {
+  Envelope report;
+  report.mutable_relay_report()->set_watchers(3);
+  first_.publisher.say(report);
+  for (const std::uint32_t watchers : {90'000u, 90'000u, 4'294'967'295u}) {
+    report.mutable_relay_report()->set_watchers(watchers);
+    come().tap.say(report);
+    pass(2);
+  }
+  ASSERT_GT(first_.upstream.said.size(), 2u);
+  for (const auto& said : first_.upstream.said)
+    EXPECT_LE(said.relay_report().watchers(), replication::kMostRelayed);
+  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), replication::kMostRelayed);
+}
+
 TEST_F(Broadcast, the_servers_clock_is_known_over_the_bus) {
   auto& ann = come();
   EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), 0u) << "not yet";
