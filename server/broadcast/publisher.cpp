@@ -20,6 +20,9 @@ constexpr std::uint64_t kReportNs = 1'100'000'000;         // the server takes o
 constexpr std::size_t kMostAnswerBytes = 8 * 1024 * 1024;  // that wait when another is begun
 constexpr std::size_t kMostAskBytes = 4096;
 constexpr double kMostAnswersPerSecond = 20;
+constexpr double kMostPongsPerSecond = 1000;
+constexpr std::size_t kMostBytesBeforePong =
+    Publisher::kBusyBytes / 2;                         // so none holds back frames
 constexpr std::uint64_t kAnswerPauseNs = 250'000'000;  // from one to the next for the same asker
 
 std::uint64_t random_number() {
@@ -59,6 +62,7 @@ Publisher::Publisher(asio::any_io_executor executor, std::unique_ptr<relay::Upst
       id_(options_.id != 0 ? options_.id : random_number()),
       next_(executor),
       answers_(kMostAnswersPerSecond, options_.clock_ns()),
+      pongs_(kMostPongsPerSecond, options_.clock_ns()),
       copy_(std::make_unique<bridge::SessionCopy>()),
       other_ns_(options_.clock_ns()) {}
 
@@ -190,19 +194,25 @@ void Publisher::take_ask(BytesView bytes, const std::string& answer_to) {
   if (!was_active_ || bytes.size() > kMostAskBytes || !subjects_.is_for_answers(answer_to)) return;
   const auto messages = split_messages(bytes);
   if (!messages) return;
+  bool is_ponged = false;
   for (const auto message : *messages) {
     proto::Envelope asked;
     if (!wire::decode_envelope(message.subspan(wire::kHeaderBytes), asked)) return;
     if (asked.has_keyframe_request()) {
       answer_all(answer_to);
     } else if (asked.has_ping()) {
-      const auto now_us = options_.clock_ns() / 1000;
-      send(answer_to, *replication::encode_pong(asked.ping().client_time_us(), copy_->tick(),
-                                                upstream_->server_time_us(now_us)));
+      if (!std::exchange(is_ponged, true)) answer_ping(answer_to, asked.ping().client_time_us());
     } else if (asked.has_relay_report()) {
       note_taker(answer_to, asked.relay_report().watchers());
     }
   }
+}
+
+void Publisher::answer_ping(const std::string& answer_to, std::uint64_t client_time_us) {
+  const auto now = options_.clock_ns();
+  if (channel_->waiting_bytes() > kMostBytesBeforePong || !pongs_.take_if_left(1, now)) return;
+  send(answer_to, *replication::encode_pong(client_time_us, copy_->tick(),
+                                            upstream_->server_time_us(now / 1000)));
 }
 
 // The picture in it is the one that the next difference is based on.

@@ -85,6 +85,7 @@ class Publisher final : public relay::Upstream {
   void publish(const std::vector<wire::SharedBytes>& messages);
   void take_stream(BytesView bytes);
   void take_ask(BytesView bytes, const std::string& answer_to);
+  void answer_ping(const std::string& answer_to, std::uint64_t client_time_us);
   void answer_all(const std::string& answer_to);
   void note_taker(const std::string& taker, std::uint32_t watchers);
   void send(const std::string& subject, BytesView whole);
@@ -100,6 +101,7 @@ class Publisher final : public relay::Upstream {
   const std::uint64_t id_;
   asio::steady_timer next_;
   pacing::Allowance answers_;  // to those who ask for all
+  pacing::Allowance pongs_;
   relay::UpstreamEvents events_;
   std::unique_ptr<bridge::SessionCopy> copy_;
   wire::SharedBytes welcome_;            // null: not yet

@@ -442,6 +442,29 @@ TEST_F(Broadcast, a_flood_of_questions_is_answered_in_part_and_others_are_answer
   EXPECT_EQ(ann.crc(), newest_crc_) << "a second later there are answers again";
 }
 
+TEST_F(Broadcast, pings_are_answered_within_limits) {
+  pass(20);
+  Askers askers(bus_, 1);
+  Envelope ping;
+  ping.mutable_ping()->set_client_time_us(1);
+  const auto one = *wire::encode_envelope(ping);
+  Bytes many;
+  for (int i = 0; i < 100; ++i) many.insert(many.end(), one.begin(), one.end());
+  const auto flood = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      askers.mouth.send(Subjects(kName).ask, many, askers.subject(0));
+    bus_.deliver();
+    return std::exchange(askers.answered[0], 0);
+  };
+  EXPECT_EQ(flood(5), 5u) << "one for each question";
+  EXPECT_LE(flood(20'000), 15'000u);
+  pass(1);
+  EXPECT_GE(flood(2000), 1000u) << "a second later there are answers again";
+  pass(1);
+  bus_.waiting_bytes = Publisher::kBusyBytes / 2 + 1;
+  EXPECT_EQ(flood(5), 0u) << "frames come first";
+}
+
 TEST_F(Broadcast, of_many_who_go_on_asking_each_is_answered) {
   Askers askers(bus_, 450);
   std::size_t rounds = 0;
