@@ -6,6 +6,7 @@
 
 #include <map>
 
+#include "server/broadcast/bus_channel.h"
 #include "server/broadcast/publisher.h"
 #include "server/broadcast/tap.h"
 #include "server/session/replication/messages.h"
@@ -176,6 +177,12 @@ class Broadcast : public ::testing::Test {
   std::vector<std::unique_ptr<Source>> others_;
   std::vector<std::unique_ptr<Taker>> takers_;
 };
+
+TEST(BusChannel, small_messages_that_wait_cost_more_than_their_content) {
+  EXPECT_EQ(BusChannel::cost("", 0, ""), 256u);
+  EXPECT_EQ(BusChannel::cost("abc", 1000, "de"), 1261u);
+  EXPECT_LE(BusChannel::kMostWaitingBytes / BusChannel::cost("", 0, ""), 262'144u);
+}
 
 TEST_F(Broadcast, who_comes_late_has_the_picture_and_follows_it) {
   publish(20);
