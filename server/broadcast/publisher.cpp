@@ -101,6 +101,7 @@ void Publisher::stop() {
 void Publisher::take_welcome(const proto::Welcome& welcome) {
   copy_ = std::make_unique<bridge::SessionCopy>();
   welcome_ = for_everybody(welcome);
+  barrier_.reset();
   published_.reset();
   reported_.reset();
   publish({welcome_});
@@ -115,8 +116,10 @@ Status Publisher::take(const proto::Envelope& message, const wire::SharedBytes& 
 
 void Publisher::take_over(EndReason reason, const std::string& text) {
   // A relay that is put out says nothing of the others.
-  if (reason == EndReason::ServerClosing && was_active_)
-    publish({replication::encode_goodbye(reason, text)});
+  if (reason == EndReason::ServerClosing && was_active_) {
+    goodbye_ = replication::encode_goodbye(reason, text);
+    publish({goodbye_});
+  }
   next_.cancel();
   if (const auto over = std::exchange(events_, {}).over) over(reason, text);
 }
@@ -143,6 +146,7 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
       break;
     case News::LastFrame:
       if (copy_->has_frame() && published_ != copy_->frame()) publish_frame(copy_->state());
+      barrier_ = framed;
       publish({framed});
       break;
     case News::Event:
@@ -230,6 +234,8 @@ void Publisher::answer_all(const std::string& answer_to) {
     all.push_back(copy_->keyframe());
     all.push_back(copy_->state());
     all.insert(all.end(), copy_->fine_parts().begin(), copy_->fine_parts().end());
+    all.push_back(barrier_);
+    all.push_back(goodbye_);
     answer_ = joined(all);
     answer_number_ = number_;
   }

@@ -16,6 +16,8 @@
 // away. Of two that began at once, the one with the smaller
 // number goes on. One that has lost its upstream is silent, too.
 //
+// When the session is over, who asks is told so, for as long as the relay is there.
+//
 // How many watch at the relays that take the session is added to the number of this one.
 // The relay's own secrets (its token, the code) never go out.
 // Thread: that of the executor.
@@ -105,6 +107,7 @@ class Publisher final : public relay::Upstream {
   relay::UpstreamEvents events_;
   std::unique_ptr<bridge::SessionCopy> copy_;
   wire::SharedBytes welcome_;            // null: not yet
+  wire::SharedBytes barrier_, goodbye_;  // of the session's end; null: it goes on
   std::uint64_t number_ = 0;             // of the newest that went out
   std::optional<Frame> published_;       // on which the next difference is based; empty: a keyframe
   Bytes answer_;                         // to who asks for all; empty: not made

@@ -88,6 +88,8 @@ void Tap::take_stream(BytesView bytes) {
     return;
   }
   if (is_following_) return take_piece(*piece);
+  if (was_welcome_ && piece->publisher == publisher_ && piece->pieces == 1)
+    note_goodbye(piece->bytes);
   early_.emplace_back(bytes.begin(), bytes.end());
   early_bytes_ += bytes.size() + kEarlyCostBytes;
   while (early_bytes_ > kMostEarlyBytes) {
@@ -151,6 +153,7 @@ void Tap::begin(const Piece& last, BytesView whole) {
   stream_ = {};
   followed_ns_ = now();
   pinged_ns_ = 0;
+  goodbye_.reset();
   const auto early = std::exchange(early_, {});
   early_bytes_ = 0;
   if (!hand_on(whole)) return;
@@ -168,6 +171,15 @@ void Tap::take_pong(BytesView whole) {
       wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok() &&
       message.has_pong())
     clock_.note(message.pong().client_time_us(), now() / 1000, message.pong().server_time_us());
+}
+
+void Tap::note_goodbye(BytesView whole) {
+  const auto messages = split_messages(whole);
+  proto::Envelope message;
+  if (messages && messages->size() == 1 &&
+      wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok() &&
+      message.has_goodbye())
+    goodbye_ = printable(message.goodbye().text(), 200);
 }
 
 bool Tap::hand_on(BytesView whole) {
@@ -248,8 +260,10 @@ void Tap::attend() {
     if (const auto lost = events_.lost) lost(why_);
   }
   if (!is_welcome_ && time >= deadline_ns_) return end(EndReason::ServerClosing, why_);
-  if (!is_following_ && time - asked_ns_ >= pause_ns_ - pause_ns_ / 1000 * shortened_)
+  if (!is_following_ && time - asked_ns_ >= pause_ns_ - pause_ns_ / 1000 * shortened_) {
+    if (goodbye_) return end(EndReason::ServerClosing, *goodbye_);
     ask_for_all();
+  }
   if (!is_following_ || time - pinged_ns_ < kPingNs) return;
   pinged_ns_ = time;
   proto::Envelope ping, report;

@@ -543,6 +543,38 @@ TEST_F(Broadcast, the_end_of_the_session_is_the_end_for_all) {
   EXPECT_EQ(ann.over, "it is over");
 }
 
+TEST_F(Broadcast, the_end_reaches_also_who_was_asking) {
+  auto& ann = come();
+  Envelope question;
+  question.mutable_keyframe_request();
+  bus_.lost_subjects = {Subjects(kName).ask};
+  pass(1);
+  ann.tap.say(question);
+  bus_.deliver();
+  ASSERT_EQ(ann.tap.counters().asks, 2u);
+  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  bus_.deliver();
+  EXPECT_TRUE(ann.over.empty()) << "the answer may come";
+  pass(1.1);
+  EXPECT_EQ(ann.over, "it is over") << "who had followed this publisher believes it";
+}
+
+TEST_F(Broadcast, who_asks_after_the_end_has_the_last_picture_and_the_end) {
+  const auto last = session_.make_frame(10);
+  session_.on_io([&] { session_.replicator().begin_barrier(last); });
+  first_.pass_on();
+  const auto barrier = first_.client->receive(Envelope::kBarrier);
+  ASSERT_TRUE(barrier);
+  first_.say(*barrier);
+  auto& ann = come();
+  EXPECT_EQ(ann.copy->last_frame(), last->frame) << "the answer says which frame is the last";
+  EXPECT_TRUE(ann.over.empty());
+  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  auto& ben = come();
+  EXPECT_EQ(ben.crc(), barrier->barrier().surface_crc());
+  EXPECT_EQ(ben.over, "it is over");
+}
+
 TEST_F(Broadcast, a_relay_that_is_put_out_ends_nothing_for_others) {
   auto& ann = come();
   first_.upstream.events.over(replication::EndReason::PutOut, "an instructor has put you out");
