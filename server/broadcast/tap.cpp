@@ -152,7 +152,6 @@ void Tap::begin(const Piece& last, BytesView whole) {
   number_ = last.number;
   stream_ = {};
   followed_ns_ = now();
-  pinged_ns_ = 0;
   goodbye_.reset();
   const auto early = std::exchange(early_, {});
   early_bytes_ = 0;
@@ -208,6 +207,8 @@ bool Tap::hand_on_message(BytesView framed) {
       return false;
     }
     is_welcome_ = true;
+    clock_ = {};  // it may be another publisher's server, or one that began anew
+    pinged_ns_ = 0;
     if (std::exchange(was_welcome_, true)) ++returns_;
     if (const auto welcome = events_.welcome) welcome(message.welcome());
     return true;

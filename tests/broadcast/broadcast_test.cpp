@@ -356,6 +356,15 @@ TEST_F(Broadcast, the_servers_clock_is_known_over_the_bus) {
   EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), now_ns_ / 1000 + 5000);
 }
 
+TEST_F(Broadcast, the_clock_is_learned_anew_when_the_publishers_server_has_another) {
+  auto& ann = come();
+  pass(3);
+  first_.upstream.ahead_us = 9'000'000;
+  first_.upstream.events.welcome(ann.welcomes[0]);
+  pass(1);
+  EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), now_ns_ / 1000 + 9'000'000);
+}
+
 TEST_F(Broadcast, the_end_of_the_session_is_the_end_for_all) {
   auto& ann = come();
   const auto last = session_.make_frame(10);
