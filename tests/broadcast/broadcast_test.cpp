@@ -420,6 +420,13 @@ TEST_F(Broadcast, a_relay_that_is_put_out_ends_nothing_for_others) {
   EXPECT_TRUE(ann.over.empty());
 }
 
+TEST_F(Broadcast, a_reason_that_nobody_knows_ends_nothing_for_others) {
+  auto& ann = come();
+  first_.upstream.events.over(replication::EndReason::Unspecified, "something new");
+  bus_.deliver();
+  EXPECT_TRUE(ann.over.empty());
+}
+
 TEST_F(Broadcast, who_finds_nobody_says_so) {
   first_.upstream.is_welcome = false;
   pass(1);
