@@ -20,6 +20,7 @@ constexpr std::uint64_t kReportNs = 1'100'000'000;         // the server takes o
 constexpr std::size_t kMostAnswerBytes = 8 * 1024 * 1024;  // that wait when another is begun
 constexpr std::size_t kMostAskBytes = 4096;
 constexpr double kMostAnswersPerSecond = 20;
+constexpr std::size_t kLeastBytes = 1024;  // of a message that the bus takes
 constexpr double kMostPongsPerSecond = 1000;
 constexpr std::size_t kMostBytesBeforePong =
     Publisher::kBusyBytes / 2;                         // so none holds back frames
@@ -115,7 +116,7 @@ Status Publisher::take(const proto::Envelope& message, const wire::SharedBytes& 
 }
 
 void Publisher::take_over(EndReason reason, const std::string& text) {
-  // A relay that is put out says nothing of the others.
+  // A relay that is put out, or for a reason that it does not know, says nothing of the others.
   if (reason == EndReason::ServerClosing && was_active_) {
     goodbye_ = replication::encode_goodbye(reason, text);
     publish({goodbye_});
@@ -180,7 +181,13 @@ void Publisher::publish(const std::vector<wire::SharedBytes>& messages) {
 
 void Publisher::send(const std::string& subject, BytesView whole) {
   const auto most = std::min(channel_->most_bytes(), kMostPieceBytes);
-  if (most <= kPieceHeaderBytes || whole.size() > kMostWholeBytes) return;
+  if (most < kLeastBytes) return;
+  if (whole.size() > kMostWholeBytes) {
+    if (!std::exchange(is_large_told_, true))
+      log::warn("{}: {} bytes at once were left out, at most {} go over NATS", options_.session,
+                whole.size(), kMostWholeBytes);
+    return;
+  }
   for (auto& piece : cut(id_, number_, whole, most)) channel_->send(subject, std::move(piece));
 }
 
@@ -272,7 +279,13 @@ void Publisher::report() {
 }
 
 void Publisher::attend() {
-  if (channel_->most_bytes() == 0) other_ns_ = options_.clock_ns();  // another may be there first
+  const auto most = channel_->most_bytes();
+  if (most < kLeastBytes) other_ns_ = options_.clock_ns();  // another may be there first
+  if (most > 0 && most < kLeastBytes && !std::exchange(is_small_told_, true))
+    log::warn(
+        "publishes nothing as {}: NATS takes messages of {} bytes, set max_payload to {} or "
+        "more",
+        options_.session, most, kLeastBytes);
   const bool was_active = std::exchange(was_active_, is_active());
   if (was_active && !was_active_)
     log::info("publishes nothing as {}: the server or NATS is gone", options_.session);

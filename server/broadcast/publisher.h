@@ -115,6 +115,8 @@ class Publisher final : public relay::Upstream {
   std::uint64_t other_ns_ = 0;           // when another publisher was heard
   bool was_active_ = false;              // as attend() has found it
   bool is_waiting_ = false;              // for another publisher, and the log says so
+  bool is_large_told_ = false;           // the log says that something did not fit
+  bool is_small_told_ = false;           // the log says that the bus takes too little
   std::map<std::string, Taker> takers_;  // by the subject for answers to them
   std::map<std::string, std::uint64_t> answered_;  // when, by that subject, of the last 0.25 s
   std::optional<std::uint32_t> own_watchers_, reported_;

@@ -70,12 +70,24 @@ TEST_F(Broadcast, frames_are_left_out_while_the_bus_is_busy_and_the_rest_is_not)
 }
 
 TEST_F(Broadcast, pieces_are_as_small_as_the_bus_wants_them) {
-  bus_.most_bytes = 200;
+  bus_.most_bytes = 1024;
   publish(50);
   auto& ann = come();
   publish(50, true);
   EXPECT_EQ(ann.crc(), newest_crc_);
   EXPECT_EQ(ann.tap.counters().asks, 1u);
+}
+
+TEST_F(Broadcast, a_bus_that_takes_less_than_1_kib_is_told_nothing) {
+  bus_.most_bytes = 1023;
+  pass(1);
+  bus_.sent_bytes = 0;
+  publish(5);
+  pass(5);
+  EXPECT_EQ(bus_.sent_bytes, 0u);
+  bus_.most_bytes = 1024;
+  pass(3);
+  EXPECT_GT(bus_.sent_bytes, 0u);
 }
 
 TEST_F(Broadcast, something_left_out_is_noticed_and_asked_for) {
@@ -197,7 +209,7 @@ TEST_F(Broadcast, after_the_bus_was_away_one_of_several_publishes) {
   bus_.most_bytes = 0;
   pass(10);
   EXPECT_EQ(ann.losses, 1);
-  bus_.most_bytes = 1000;
+  bus_.most_bytes = 1024;
   bus_.sent_bytes = 0;
   pass(1.8);
   EXPECT_LT(bus_.sent_bytes, 500u) << "questions alone, while they listen";
