@@ -21,15 +21,15 @@ BusChannel::~BusChannel() = default;
 Status BusChannel::listen(const std::string& subject, Take take) {
   takes_.push_back(std::make_shared<Take>(std::move(take)));
   const std::weak_ptr<Take> kept = takes_.back();
-  return bus_->subscribe(subject, [executor = executor_, waiting = waiting_in_, kept](
+  return bus_->subscribe(subject, [executor = executor_, waiting = waiting_in_, kept, subject](
                                       const std::string& text, const std::string& answer_to) {
-    const auto size = text.size();
+    const auto size = cost(subject, text.size(), answer_to);
     if (waiting->fetch_add(size) + size > kMostWaitingBytes) {
       *waiting -= size;
       return;
     }
-    asio::post(executor, [waiting, kept, text, answer_to] {
-      *waiting -= text.size();
+    asio::post(executor, [waiting, kept, text, answer_to, size] {
+      *waiting -= size;
       const auto still = kept.lock();
       if (still) (*still)(bytes_of(std::string_view(text)), answer_to);
     });
@@ -37,9 +37,10 @@ Status BusChannel::listen(const std::string& subject, Take take) {
 }
 
 void BusChannel::send(const std::string& subject, Bytes bytes, const std::string& answer_to) {
-  if (waiting_out_ + bytes.size() > kMostWaitingBytes) return;
+  const auto size = cost(subject, bytes.size(), answer_to);
+  if (waiting_out_ + size > kMostWaitingBytes) return;
   const std::lock_guard guard(lock_);
-  waiting_out_ += bytes.size();
+  waiting_out_ += size;
   letters_.push_back({subject, {bytes.begin(), bytes.end()}, answer_to});
   has_letter_.notify_one();
 }
@@ -58,7 +59,7 @@ void BusChannel::send_all(const std::stop_token& stop) {
       if (now > *end) return;
     }
     bus_->publish(letter.subject, letter.text, letter.answer_to);
-    waiting_out_ -= letter.text.size();
+    waiting_out_ -= cost(letter.subject, letter.text.size(), letter.answer_to);
   }
 }
 

@@ -13,6 +13,8 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -24,6 +26,12 @@ namespace trocar::broadcast {
 class BusChannel final : public Channel {
  public:
   static constexpr std::size_t kMostWaitingBytes = 64 * 1024 * 1024;
+  static constexpr std::size_t kMessageCostBytes = 256;  // of one that waits, beside its content
+
+  // Returns what a message that waits counts, in bytes.
+  static std::size_t cost(std::string_view subject, std::size_t bytes, std::string_view answer_to) {
+    return kMessageCostBytes + subject.size() + bytes + answer_to.size();
+  }
 
   BusChannel(asio::any_io_executor executor, std::unique_ptr<bus::Bus> bus);
   ~BusChannel() override;

@@ -20,7 +20,11 @@ constexpr std::uint64_t kReportNs = 1'100'000'000;         // the server takes o
 constexpr std::size_t kMostAnswerBytes = 8 * 1024 * 1024;  // that wait when another is begun
 constexpr std::size_t kMostAskBytes = 4096;
 constexpr double kMostAnswersPerSecond = 20;
-constexpr std::uint32_t kMostWatchersThere = 100'000;
+constexpr std::size_t kLeastBytes = 1024;  // of a message that the bus takes
+constexpr double kMostPongsPerSecond = 1000;
+constexpr std::size_t kMostBytesBeforePong =
+    Publisher::kBusyBytes / 2;                         // so none holds back frames
+constexpr std::uint64_t kAnswerPauseNs = 250'000'000;  // from one to the next for the same asker
 
 std::uint64_t random_number() {
   std::uint64_t number = 0;
@@ -59,6 +63,7 @@ Publisher::Publisher(asio::any_io_executor executor, std::unique_ptr<relay::Upst
       id_(options_.id != 0 ? options_.id : random_number()),
       next_(executor),
       answers_(kMostAnswersPerSecond, options_.clock_ns()),
+      pongs_(kMostPongsPerSecond, options_.clock_ns()),
       copy_(std::make_unique<bridge::SessionCopy>()),
       other_ns_(options_.clock_ns()) {}
 
@@ -97,6 +102,7 @@ void Publisher::stop() {
 void Publisher::take_welcome(const proto::Welcome& welcome) {
   copy_ = std::make_unique<bridge::SessionCopy>();
   welcome_ = for_everybody(welcome);
+  barrier_.reset();
   published_.reset();
   reported_.reset();
   publish({welcome_});
@@ -110,9 +116,11 @@ Status Publisher::take(const proto::Envelope& message, const wire::SharedBytes& 
 }
 
 void Publisher::take_over(EndReason reason, const std::string& text) {
-  // A relay that is put out says nothing of the others.
-  if (reason == EndReason::ServerClosing && was_active_)
-    publish({replication::encode_goodbye(reason, text)});
+  // A relay that is put out, or for a reason that it does not know, says nothing of the others.
+  if (reason == EndReason::ServerClosing && was_active_) {
+    goodbye_ = replication::encode_goodbye(reason, text);
+    publish({goodbye_});
+  }
   next_.cancel();
   if (const auto over = std::exchange(events_, {}).over) over(reason, text);
 }
@@ -139,6 +147,7 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
       break;
     case News::LastFrame:
       if (copy_->has_frame() && published_ != copy_->frame()) publish_frame(copy_->state());
+      barrier_ = framed;
       publish({framed});
       break;
     case News::Event:
@@ -172,7 +181,13 @@ void Publisher::publish(const std::vector<wire::SharedBytes>& messages) {
 
 void Publisher::send(const std::string& subject, BytesView whole) {
   const auto most = std::min(channel_->most_bytes(), kMostPieceBytes);
-  if (most <= kPieceHeaderBytes || whole.size() > kMostWholeBytes) return;
+  if (most < kLeastBytes) return;
+  if (whole.size() > kMostWholeBytes) {
+    if (!std::exchange(is_large_told_, true))
+      log::warn("{}: {} bytes at once were left out, at most {} go over NATS", options_.session,
+                whole.size(), kMostWholeBytes);
+    return;
+  }
   for (auto& piece : cut(id_, number_, whole, most)) channel_->send(subject, std::move(piece));
 }
 
@@ -190,26 +205,35 @@ void Publisher::take_ask(BytesView bytes, const std::string& answer_to) {
   if (!was_active_ || bytes.size() > kMostAskBytes || !subjects_.is_for_answers(answer_to)) return;
   const auto messages = split_messages(bytes);
   if (!messages) return;
+  bool is_ponged = false;
   for (const auto message : *messages) {
     proto::Envelope asked;
     if (!wire::decode_envelope(message.subspan(wire::kHeaderBytes), asked)) return;
     if (asked.has_keyframe_request()) {
       answer_all(answer_to);
     } else if (asked.has_ping()) {
-      const auto now_us = options_.clock_ns() / 1000;
-      send(answer_to, *replication::encode_pong(asked.ping().client_time_us(), copy_->tick(),
-                                                upstream_->server_time_us(now_us)));
+      if (!std::exchange(is_ponged, true)) answer_ping(answer_to, asked.ping().client_time_us());
     } else if (asked.has_relay_report()) {
       note_taker(answer_to, asked.relay_report().watchers());
     }
   }
 }
 
+void Publisher::answer_ping(const std::string& answer_to, std::uint64_t client_time_us) {
+  const auto now = options_.clock_ns();
+  if (channel_->waiting_bytes() > kMostBytesBeforePong || !pongs_.take_if_left(1, now)) return;
+  send(answer_to, *replication::encode_pong(client_time_us, copy_->tick(),
+                                            upstream_->server_time_us(now / 1000)));
+}
+
 // The picture in it is the one that the next difference is based on.
 void Publisher::answer_all(const std::string& answer_to) {
+  const auto now = options_.clock_ns();
+  std::erase_if(answered_, [&](const auto& one) { return now - one.second >= kAnswerPauseNs; });
   if (!welcome_ || !copy_->has_frame() || channel_->waiting_bytes() > kMostAnswerBytes ||
-      !answers_.take(1, options_.clock_ns()))
+      answered_.contains(answer_to) || !answers_.take_if_left(1, now))
     return;
+  answered_[answer_to] = now;
   if (published_ != copy_->frame()) publish_frame(copy_->state());
   if (answer_.empty() || answer_number_ != number_) {
     std::vector<wire::SharedBytes> all{welcome_};
@@ -217,6 +241,8 @@ void Publisher::answer_all(const std::string& answer_to) {
     all.push_back(copy_->keyframe());
     all.push_back(copy_->state());
     all.insert(all.end(), copy_->fine_parts().begin(), copy_->fine_parts().end());
+    all.push_back(barrier_);
+    all.push_back(goodbye_);
     answer_ = joined(all);
     answer_number_ = number_;
   }
@@ -233,15 +259,17 @@ void Publisher::say(const proto::Envelope& message) {
 
 void Publisher::note_taker(const std::string& taker, std::uint32_t watchers) {
   if (takers_.size() >= kMostTakers && !takers_.contains(taker)) return;
-  takers_[taker] = {std::min(watchers, kMostWatchersThere), options_.clock_ns()};
+  takers_[taker] = {watchers, options_.clock_ns()};
 }
 
 void Publisher::report() {
   const auto now = options_.clock_ns();
   std::erase_if(takers_, [&](const auto& one) { return now - one.second.heard_ns > kTakerNs; });
   if (!own_watchers_ || !upstream_->is_welcome() || now - reported_ns_ < kReportNs) return;
-  auto watchers = *own_watchers_;
-  for (const auto& [name, taker] : takers_) watchers += taker.watchers;
+  std::uint64_t sum = *own_watchers_;
+  for (const auto& [name, taker] : takers_) sum += taker.watchers;
+  const auto watchers =
+      static_cast<std::uint32_t>(std::min(sum, std::uint64_t{replication::kMostRelayed}));
   if (reported_ == watchers) return;
   reported_ = watchers;
   reported_ns_ = now;
@@ -251,7 +279,13 @@ void Publisher::report() {
 }
 
 void Publisher::attend() {
-  if (channel_->most_bytes() == 0) other_ns_ = options_.clock_ns();  // another may be there first
+  const auto most = channel_->most_bytes();
+  if (most < kLeastBytes) other_ns_ = options_.clock_ns();  // another may be there first
+  if (most > 0 && most < kLeastBytes && !std::exchange(is_small_told_, true))
+    log::warn(
+        "publishes nothing as {}: NATS takes messages of {} bytes, set max_payload to {} or "
+        "more",
+        options_.session, most, kLeastBytes);
   const bool was_active = std::exchange(was_active_, is_active());
   if (was_active && !was_active_)
     log::info("publishes nothing as {}: the server or NATS is gone", options_.session);

@@ -16,6 +16,8 @@
 // away. Of two that began at once, the one with the smaller
 // number goes on. One that has lost its upstream is silent, too.
 //
+// When the session is over, who asks is told so, for as long as the relay is there.
+//
 // How many watch at the relays that take the session is added to the number of this one.
 // The relay's own secrets (its token, the code) never go out.
 // Thread: that of the executor.
@@ -85,6 +87,7 @@ class Publisher final : public relay::Upstream {
   void publish(const std::vector<wire::SharedBytes>& messages);
   void take_stream(BytesView bytes);
   void take_ask(BytesView bytes, const std::string& answer_to);
+  void answer_ping(const std::string& answer_to, std::uint64_t client_time_us);
   void answer_all(const std::string& answer_to);
   void note_taker(const std::string& taker, std::uint32_t watchers);
   void send(const std::string& subject, BytesView whole);
@@ -100,9 +103,11 @@ class Publisher final : public relay::Upstream {
   const std::uint64_t id_;
   asio::steady_timer next_;
   pacing::Allowance answers_;  // to those who ask for all
+  pacing::Allowance pongs_;
   relay::UpstreamEvents events_;
   std::unique_ptr<bridge::SessionCopy> copy_;
   wire::SharedBytes welcome_;            // null: not yet
+  wire::SharedBytes barrier_, goodbye_;  // of the session's end; null: it goes on
   std::uint64_t number_ = 0;             // of the newest that went out
   std::optional<Frame> published_;       // on which the next difference is based; empty: a keyframe
   Bytes answer_;                         // to who asks for all; empty: not made
@@ -110,7 +115,10 @@ class Publisher final : public relay::Upstream {
   std::uint64_t other_ns_ = 0;           // when another publisher was heard
   bool was_active_ = false;              // as attend() has found it
   bool is_waiting_ = false;              // for another publisher, and the log says so
+  bool is_large_told_ = false;           // the log says that something did not fit
+  bool is_small_told_ = false;           // the log says that the bus takes too little
   std::map<std::string, Taker> takers_;  // by the subject for answers to them
+  std::map<std::string, std::uint64_t> answered_;  // when, by that subject, of the last 0.25 s
   std::optional<std::uint32_t> own_watchers_, reported_;
   std::uint64_t reported_ns_ = 0;
 };

@@ -28,6 +28,11 @@ std::string random_id() {
   return secure::to_hex(id);
 }
 
+// Returns how many thousandths shorter this one's pauses are: 0 to 255, by the id's last byte.
+std::uint64_t shortening_of(const std::string& id) {
+  return std::stoul(id.substr(id.size() - 2), nullptr, 16);
+}
+
 }  // namespace
 
 Tap::Tap(asio::any_io_executor executor, std::unique_ptr<Channel> channel, TapOptions options)
@@ -35,6 +40,7 @@ Tap::Tap(asio::any_io_executor executor, std::unique_ptr<Channel> channel, TapOp
       options_(std::move(options)),
       subjects_(options_.session),
       answers_(subjects_.answers_to(random_id())),
+      shortened_(shortening_of(answers_)),
       next_(executor),
       why_("nobody publishes the session " + options_.session + " there") {}
 
@@ -82,6 +88,8 @@ void Tap::take_stream(BytesView bytes) {
     return;
   }
   if (is_following_) return take_piece(*piece);
+  if (was_welcome_ && piece->publisher == publisher_ && piece->pieces == 1)
+    note_goodbye(piece->bytes);
   early_.emplace_back(bytes.begin(), bytes.end());
   early_bytes_ += bytes.size() + kEarlyCostBytes;
   while (early_bytes_ > kMostEarlyBytes) {
@@ -144,7 +152,7 @@ void Tap::begin(const Piece& last, BytesView whole) {
   number_ = last.number;
   stream_ = {};
   followed_ns_ = now();
-  pinged_ns_ = 0;
+  goodbye_.reset();
   const auto early = std::exchange(early_, {});
   early_bytes_ = 0;
   if (!hand_on(whole)) return;
@@ -162,6 +170,15 @@ void Tap::take_pong(BytesView whole) {
       wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok() &&
       message.has_pong())
     clock_.note(message.pong().client_time_us(), now() / 1000, message.pong().server_time_us());
+}
+
+void Tap::note_goodbye(BytesView whole) {
+  const auto messages = split_messages(whole);
+  proto::Envelope message;
+  if (messages && messages->size() == 1 &&
+      wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok() &&
+      message.has_goodbye())
+    goodbye_ = printable(message.goodbye().text(), 200);
 }
 
 bool Tap::hand_on(BytesView whole) {
@@ -190,6 +207,8 @@ bool Tap::hand_on_message(BytesView framed) {
       return false;
     }
     is_welcome_ = true;
+    clock_ = {};  // it may be another publisher's server, or one that began anew
+    pinged_ns_ = 0;
     if (std::exchange(was_welcome_, true)) ++returns_;
     if (const auto welcome = events_.welcome) welcome(message.welcome());
     return true;
@@ -242,7 +261,10 @@ void Tap::attend() {
     if (const auto lost = events_.lost) lost(why_);
   }
   if (!is_welcome_ && time >= deadline_ns_) return end(EndReason::ServerClosing, why_);
-  if (!is_following_ && time - asked_ns_ >= pause_ns_) ask_for_all();
+  if (!is_following_ && time - asked_ns_ >= pause_ns_ - pause_ns_ / 1000 * shortened_) {
+    if (goodbye_) return end(EndReason::ServerClosing, *goodbye_);
+    ask_for_all();
+  }
   if (!is_following_ || time - pinged_ns_ < kPingNs) return;
   pinged_ns_ = time;
   proto::Envelope ping, report;

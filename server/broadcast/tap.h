@@ -8,10 +8,12 @@
 //     |_____ a number is missing, the copy has lost count, or a message was wrong
 //     |_____ lost: for 3 s nothing has come of the publisher that it follows
 //
-// It asks at once, then after 0.5 s and longer pauses of up to 4 s. It follows one publisher, and
+// It asks at once, then after 0.5 s and longer pauses of up to 4 s, all of them up to a quarter
+// shorter by its id, so that taps do not ask in step. It follows one publisher, and
 // hears no other one meanwhile. Everything comes anew with each answer, as from a server to which a
 // relay has come back. It ends when the publisher says that the session is over, or when there was
-// no publisher for too long.
+// no publisher for too long. When it hears that while it asks, it waits for the last picture first,
+// until it would ask again.
 //
 // Whoever may publish on that bus is believed: see docs/security.md. What comes is checked like
 // what a server says.
@@ -24,6 +26,7 @@
 #include <chrono>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/base/timing.h"
@@ -81,6 +84,7 @@ class Tap final : public relay::Upstream {
   bool hand_on(BytesView whole);
   bool hand_on_message(BytesView framed);
   void take_pong(BytesView whole);
+  void note_goodbye(BytesView whole);
   // Nothing fits any more until all has come anew.
   void lose_count(const std::string& why);
   void ask_for_all();
@@ -92,7 +96,8 @@ class Tap final : public relay::Upstream {
   const std::unique_ptr<Channel> channel_;
   const TapOptions options_;
   const Subjects subjects_;
-  const std::string answers_;  // the subject for answers to this
+  const std::string answers_;      // the subject for answers to this
+  const std::uint64_t shortened_;  // thousandths by which its pauses are shorter
   asio::steady_timer next_;
   relay::UpstreamEvents events_;
   bridge::ServerClock clock_;
@@ -106,6 +111,8 @@ class Tap final : public relay::Upstream {
 
   bool is_welcome_ = false, was_welcome_ = false, is_over_ = false;
   std::string why_;
+  // Says what the publisher that it has followed said at its end while this asked, if anything.
+  std::optional<std::string> goodbye_;
   std::uint64_t followed_ns_ = 0, asked_ns_ = 0, pinged_ns_ = 0, deadline_ns_ = 0;
   std::uint64_t pause_ns_ = 0;  // from one question to the next
   std::uint32_t watchers_ = 0;

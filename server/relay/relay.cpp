@@ -80,10 +80,10 @@ Status Relay::take_in_crowd(const proto::Envelope& message, const wire::SharedBy
 }
 
 void Relay::note_over(EndReason reason, const std::string& text) {
-  const bool is_closed = reason == EndReason::ServerClosing;
+  const bool is_closed = reason == EndReason::ServerClosing || reason == EndReason::Unspecified;
   if (!is_closed || !is_listening_)
     outcome_ = Error{is_closed ? ErrorCode::ResourceMissing : ErrorCode::Refused, text};
-  end(reason, text);
+  end(is_closed ? EndReason::ServerClosing : reason, text);
 }
 
 void Relay::fail(const Error& error) {

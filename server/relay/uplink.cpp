@@ -259,7 +259,7 @@ bool Uplink::take_goodbye(const proto::Goodbye& goodbye) {
   }
   const auto reason = static_cast<int>(goodbye.reason());
   end(reason > 0 && reason < replication::kEndReasonCount ? static_cast<EndReason>(reason)
-                                                          : EndReason::ServerClosing,
+                                                          : EndReason::Unspecified,
       why_);
   return false;
 }

@@ -2,154 +2,16 @@
 // come, whatever is lost on the way, and whoever else publishes. The session is a real server
 // without a simulation; the bus is one in memory, and so is the clock.
 
-#include <gtest/gtest.h>
-
-#include "server/broadcast/publisher.h"
-#include "server/broadcast/tap.h"
-#include "server/session/replication/messages.h"
-#include "tests/broadcast/fake_bus.h"
-#include "tests/network/session_fixture.h"
+#include "server/broadcast/bus_channel.h"
+#include "tests/broadcast/session_on_bus.h"
 
 namespace trocar::broadcast {
 namespace {
 
-using proto::Envelope;
-using testing::LiveSession;
-using testing::RawClient;
-
-constexpr const char* kName = "monday";
-
-// One that passes the session on, with a connection to the server of its own.
-struct Source {
-  Source(FakeBus& bus, asio::io_context& io, LiveSession& from, std::uint64_t id,
-         const std::function<std::uint64_t()>& clock_ns)
-      : session(from),
-        publisher(io.get_executor(), std::make_unique<FakeUpstream>(upstream),
-                  std::make_unique<FakeChannel>(bus), {kName, id, clock_ns}) {
-    EXPECT_TRUE(publisher.listen().ok());
-    publisher.start({.welcome = [this](const auto&) { ++welcomes; },
-                     .message =
-                         [this](const auto&, const auto&) {
-                           ++messages;
-                           return Status();
-                         },
-                     .lost = {},
-                     .over = {}});
-  }
-  // Joins the server, up to the first picture.
-  void join(const std::string& name = "Relay") {
-    client = std::make_unique<RawClient>(session.port());
-    ASSERT_TRUE(client->send(testing::make_hello(name, proto::ROLE_OBSERVER)));
-    const auto welcome = client->receive(Envelope::kWelcome);
-    ASSERT_TRUE(welcome);
-    upstream.is_welcome = true;
-    auto told = welcome->welcome();
-    told.set_return_token("0123456789abcdef");
-    told.add_further_address("10.0.0.7:7690");
-    upstream.events.welcome(told);
-    pass_on();
-  }
-  // Hands on what the server says, up to the next FrameState.
-  void pass_on() {
-    while (const auto message = client->receive()) {
-      ASSERT_TRUE(upstream.events.message(*message, wire::encode_envelope(*message)).ok());
-      if (message->has_frame_state()) return;
-    }
-    FAIL() << "the server has closed";
-  }
-  void say(const Envelope& message) {
-    ASSERT_TRUE(upstream.events.message(message, wire::encode_envelope(message)).ok());
-  }
-
-  LiveSession& session;
-  FakeUpstream::State upstream;
-  std::unique_ptr<RawClient> client;
-  int welcomes = 0, messages = 0;
-  Publisher publisher;
-};
-
-// A relay's place behind a tap.
-struct Taker {
-  Taker(FakeBus& bus, asio::io_context& io, const std::function<std::uint64_t()>& clock_ns)
-      : tap(io.get_executor(), std::make_unique<FakeChannel>(bus),
-            {.session = kName, .clock_ns = clock_ns}) {
-    EXPECT_TRUE(tap.listen().ok());
-    tap.start({.welcome =
-                   [this](const auto& welcome) {
-                     welcomes.push_back(welcome);
-                     copy = std::make_unique<bridge::SessionCopy>();
-                   },
-               .message =
-                   [this](const auto& message, const auto& framed) {
-                     const auto news = copy->take(message, framed);
-                     if (copy->needs_keyframe()) {
-                       Envelope request;
-                       request.mutable_keyframe_request();
-                       tap.say(request);
-                     }
-                     return news.ok() ? Status() : news.error();
-                   },
-               .lost = [this](const std::string&) { ++losses; },
-               .over = [this](replication::EndReason, const std::string& text) { over = text; }});
-  }
-  // 0: there is no picture.
-  std::uint32_t crc() const { return copy && copy->has_frame() ? copy->surface_crc() : 0; }
-
-  std::vector<proto::Welcome> welcomes;
-  std::unique_ptr<bridge::SessionCopy> copy;
-  int losses = 0;
-  std::string over;
-  Tap tap;
-};
-
-class Broadcast : public ::testing::Test {
- protected:
-  Broadcast() {
-    make(10);
-    first_.join();
-    pass(2.0);
-  }
-  std::unique_ptr<Source> make_source(std::uint64_t id) {
-    return std::make_unique<Source>(bus_, io_, session_, id, clock_);
-  }
-  Taker& come() {
-    takers_.push_back(std::make_unique<Taker>(bus_, io_, clock_));
-    bus_.deliver();
-    return *takers_.back();
-  }
-  // The clock goes on, and everybody attends to his business ten times a second.
-  void pass(double seconds) {
-    for (int i = 0; i < seconds * 10; ++i) {
-      now_ns_ += 100'000'000;
-      first_.publisher.attend();
-      for (const auto& other : others_) other->publisher.attend();
-      for (const auto& taker : takers_) taker->tap.attend();
-      bus_.deliver();
-    }
-  }
-  // The next frame reaches the first source.
-  void publish(std::size_t changes, bool is_cut = false) {
-    make(changes, is_cut);
-    first_.pass_on();
-    bus_.deliver();
-  }
-  // The server publishes the next frame, and nobody has it yet.
-  void make(std::size_t changes, bool is_cut = false) {
-    const auto frame = session_.make_frame(changes, is_cut);
-    newest_crc_ = wire::surface_crc(frame->surface);
-    session_.publish_all({frame});
-  }
-
-  std::uint32_t newest_crc_ = 0;
-  std::uint64_t now_ns_ = 1'000'000'000'000;
-  const std::function<std::uint64_t()> clock_ = [this] { return now_ns_; };
-  LiveSession session_;
-  asio::io_context io_{1};  // it never runs: timers do not matter here
-  FakeBus bus_;
-  Source first_{bus_, io_, session_, 100, clock_};
-  std::vector<std::unique_ptr<Source>> others_;
-  std::vector<std::unique_ptr<Taker>> takers_;
-};
+TEST(BusChannel, small_messages_that_wait_cost_more_than_their_content) {
+  EXPECT_EQ(BusChannel::cost("", 0, ""), 256u);
+  EXPECT_EQ(BusChannel::cost("abc", 1000, "de"), 1261u);
+}
 
 TEST_F(Broadcast, who_comes_late_has_the_picture_and_follows_it) {
   publish(20);
@@ -208,12 +70,24 @@ TEST_F(Broadcast, frames_are_left_out_while_the_bus_is_busy_and_the_rest_is_not)
 }
 
 TEST_F(Broadcast, pieces_are_as_small_as_the_bus_wants_them) {
-  bus_.most_bytes = 200;
+  bus_.most_bytes = 1024;
   publish(50);
   auto& ann = come();
   publish(50, true);
   EXPECT_EQ(ann.crc(), newest_crc_);
   EXPECT_EQ(ann.tap.counters().asks, 1u);
+}
+
+TEST_F(Broadcast, a_bus_that_takes_less_than_1_kib_is_told_nothing) {
+  bus_.most_bytes = 1023;
+  pass(1);
+  bus_.sent_bytes = 0;
+  publish(5);
+  pass(5);
+  EXPECT_EQ(bus_.sent_bytes, 0u);
+  bus_.most_bytes = 1024;
+  pass(3);
+  EXPECT_GT(bus_.sent_bytes, 0u);
 }
 
 TEST_F(Broadcast, something_left_out_is_noticed_and_asked_for) {
@@ -335,7 +209,7 @@ TEST_F(Broadcast, after_the_bus_was_away_one_of_several_publishes) {
   bus_.most_bytes = 0;
   pass(10);
   EXPECT_EQ(ann.losses, 1);
-  bus_.most_bytes = 1000;
+  bus_.most_bytes = 1024;
   bus_.sent_bytes = 0;
   pass(1.8);
   EXPECT_LT(bus_.sent_bytes, 500u) << "questions alone, while they listen";
@@ -400,18 +274,55 @@ TEST_F(Broadcast, answers_go_nowhere_else) {
   mallory.send(Subjects(kName).ask, asked, "");
   bus_.deliver();
   EXPECT_FALSE(is_heard);
-  bus_.sent_bytes = 0;
-  for (int i = 0; i < 1000; ++i)
-    mallory.send(Subjects(kName).ask, asked, Subjects(kName).answers_to("ab"));
-  const auto questions = std::exchange(bus_.sent_bytes, 0);
-  EXPECT_GT(questions, 0u);
+}
+
+TEST_F(Broadcast, a_flood_of_questions_is_answered_in_part_and_others_are_answered_soon) {
+  Askers askers(bus_, 1000);
+  for (int i = 0; i < 1000; ++i) askers.ask(0);
   bus_.deliver();
-  const auto flood = std::exchange(bus_.sent_bytes, 0);
-  now_ns_ += 60'000'000'000;
-  first_.publisher.attend();
-  mallory.send(Subjects(kName).ask, asked, Subjects(kName).answers_to("ab"));
+  EXPECT_EQ(askers.answers(), 1u) << "one asker is not answered twice in 0.25 s";
+  for (std::size_t i = 0; i < 1000; ++i) askers.ask(i);
   bus_.deliver();
-  EXPECT_LE(flood, 400 * bus_.sent_bytes) << "so many are answered at once, and no more";
+  EXPECT_GT(askers.answers(), 20u);
+  EXPECT_LE(askers.answers(), 300u) << "so many are answered at once, and no more";
+  pass(1);
+  const auto& ann = come();
+  EXPECT_EQ(ann.crc(), newest_crc_) << "a second later there are answers again";
+}
+
+TEST_F(Broadcast, pings_are_answered_within_limits) {
+  pass(20);
+  Askers askers(bus_, 1);
+  Envelope ping;
+  ping.mutable_ping()->set_client_time_us(1);
+  const auto one = *wire::encode_envelope(ping);
+  Bytes many;
+  for (int i = 0; i < 100; ++i) many.insert(many.end(), one.begin(), one.end());
+  const auto flood = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      askers.mouth.send(Subjects(kName).ask, many, askers.subject(0));
+    bus_.deliver();
+    return std::exchange(askers.answered[0], 0);
+  };
+  EXPECT_EQ(flood(5), 5u) << "one for each question";
+  EXPECT_LE(flood(20'000), 15'000u);
+  pass(1);
+  EXPECT_GE(flood(2000), 1000u) << "a second later there are answers again";
+  pass(1);
+  bus_.waiting_bytes = Publisher::kBusyBytes / 2 + 1;
+  EXPECT_EQ(flood(5), 0u) << "frames come first";
+}
+
+TEST_F(Broadcast, of_many_who_go_on_asking_each_is_answered) {
+  Askers askers(bus_, 450);
+  std::size_t rounds = 0;
+  while (askers.answered.size() < 450 && rounds++ < 30) {
+    for (std::size_t i = 0; i < 450; ++i)
+      if (!askers.answered.contains(i)) askers.ask(i);
+    bus_.deliver();
+    pass(1);
+  }
+  EXPECT_EQ(askers.answered.size(), 450u);
 }
 
 TEST_F(Broadcast, the_server_knows_how_many_watch_everywhere) {
@@ -435,11 +346,35 @@ TEST_F(Broadcast, the_server_knows_how_many_watch_everywhere) {
   EXPECT_LE(first_.upstream.said.size(), 4u) << "it is said when it changes";
 }
 
+TEST_F(Broadcast, more_than_the_server_takes_are_never_reported) {
+  Envelope report;
+  report.mutable_relay_report()->set_watchers(3);
+  first_.publisher.say(report);
+  for (const std::uint32_t watchers : {90'000u, 90'000u, 4'294'967'295u}) {
+    report.mutable_relay_report()->set_watchers(watchers);
+    come().tap.say(report);
+    pass(2);
+  }
+  ASSERT_GT(first_.upstream.said.size(), 2u);
+  for (const auto& said : first_.upstream.said)
+    EXPECT_LE(said.relay_report().watchers(), replication::kMostRelayed);
+  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), replication::kMostRelayed);
+}
+
 TEST_F(Broadcast, the_servers_clock_is_known_over_the_bus) {
   auto& ann = come();
   EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), 0u) << "not yet";
   pass(1);
   EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), now_ns_ / 1000 + 5000);
+}
+
+TEST_F(Broadcast, the_clock_is_learned_anew_when_the_publishers_server_has_another) {
+  auto& ann = come();
+  pass(3);
+  first_.upstream.ahead_us = 9'000'000;
+  first_.upstream.events.welcome(ann.welcomes[0]);
+  pass(1);
+  EXPECT_EQ(ann.tap.server_time_us(now_ns_ / 1000), now_ns_ / 1000 + 9'000'000);
 }
 
 TEST_F(Broadcast, the_end_of_the_session_is_the_end_for_all) {
@@ -458,9 +393,48 @@ TEST_F(Broadcast, the_end_of_the_session_is_the_end_for_all) {
   EXPECT_EQ(ann.over, "it is over");
 }
 
+TEST_F(Broadcast, the_end_reaches_also_who_was_asking) {
+  auto& ann = come();
+  Envelope question;
+  question.mutable_keyframe_request();
+  bus_.lost_subjects = {Subjects(kName).ask};
+  pass(1);
+  ann.tap.say(question);
+  bus_.deliver();
+  ASSERT_EQ(ann.tap.counters().asks, 2u);
+  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  bus_.deliver();
+  EXPECT_TRUE(ann.over.empty()) << "the answer may come";
+  pass(1.1);
+  EXPECT_EQ(ann.over, "it is over") << "who had followed this publisher believes it";
+}
+
+TEST_F(Broadcast, who_asks_after_the_end_has_the_last_picture_and_the_end) {
+  const auto last = session_.make_frame(10);
+  session_.on_io([&] { session_.replicator().begin_barrier(last); });
+  first_.pass_on();
+  const auto barrier = first_.client->receive(Envelope::kBarrier);
+  ASSERT_TRUE(barrier);
+  first_.say(*barrier);
+  auto& ann = come();
+  EXPECT_EQ(ann.copy->last_frame(), last->frame) << "the answer says which frame is the last";
+  EXPECT_TRUE(ann.over.empty());
+  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  auto& ben = come();
+  EXPECT_EQ(ben.crc(), barrier->barrier().surface_crc());
+  EXPECT_EQ(ben.over, "it is over");
+}
+
 TEST_F(Broadcast, a_relay_that_is_put_out_ends_nothing_for_others) {
   auto& ann = come();
   first_.upstream.events.over(replication::EndReason::PutOut, "an instructor has put you out");
+  bus_.deliver();
+  EXPECT_TRUE(ann.over.empty());
+}
+
+TEST_F(Broadcast, a_reason_that_nobody_knows_ends_nothing_for_others) {
+  auto& ann = come();
+  first_.upstream.events.over(replication::EndReason::Unspecified, "something new");
   bus_.deliver();
   EXPECT_TRUE(ann.over.empty());
 }

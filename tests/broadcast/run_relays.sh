@@ -54,6 +54,12 @@ wait_for() { # WORDS FILE [TIMES]
   done
   fail "$2 never says '$1'"
 }
+lines() { # WORDS FILE
+  grep -cs -- "$1" "$2" || true
+}
+wait_for_another() { # WORDS FILE BEFORE
+  wait_for "$1" "$2" $(($3 + 1))
+}
 start_relay() { # NAME ARGUMENTS...
   start "$1" trocar-relay --listen 127.0.0.1:0 --ready-file "$1.port" --name "$1" --nats $url "${@:2}"
 }
@@ -109,11 +115,13 @@ ready late
 watch Ben late
 wait_for 'watchers here' late.log
 
+still=$(lines 'stands still' early.log)
+back_early=$(lines 'back in the session' early.log) back_late=$(lines 'back in the session' late.log)
 killed nats
-wait_for 'stands still' early.log
+wait_for_another 'stands still' early.log "$still"
 start_nats
-wait_for 'back in the session' early.log
-wait_for 'back in the session' late.log
+wait_for_another 'back in the session' early.log "$back_early"
+wait_for_another 'back in the session' late.log "$back_late"
 
 # Either of the two publishes now.
 publisher=
@@ -127,13 +135,17 @@ done
 [ -n "$publisher" ] || fail "nobody publishes"
 spare=spare
 [ $publisher = first ] || spare=first
-before=$(grep -c 'info publishes the session' $spare.log || true)
+publishes=$(lines 'info publishes the session' $spare.log)
+declare -A still_of back_of
+for name in early late; do
+  still_of[$name]=$(lines 'stands still' $name.log) back_of[$name]=$(lines 'back in the session' $name.log)
+done
 killed $publisher
-wait_for 'info publishes the session as monday' $spare.log $((before + 1))
-wait_for 'stands still' early.log 2
-wait_for 'stands still' late.log 2
-wait_for 'back in the session' early.log 2
-wait_for 'back in the session' late.log 2
+wait_for_another 'info publishes the session' $spare.log "$publishes"
+for name in early late; do
+  wait_for_another 'stands still' $name.log "${still_of[$name]}"
+  wait_for_another 'back in the session' $name.log "${back_of[$name]}"
+done
 
 # A session that nobody publishes is an error, and so is one whose subjects this user may not have.
 code_of=0

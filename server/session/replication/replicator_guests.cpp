@@ -7,11 +7,6 @@
 #include "server/session/replication/replicator_client.h"
 
 namespace trocar::replication {
-namespace {
-
-constexpr std::uint32_t kMostRelayed = 100'000;
-
-}  // namespace
 
 std::optional<Replicator::Ending> Replicator::check_guest(Client& guest,
                                                           const proto::Envelope& message) {

@@ -28,6 +28,7 @@ namespace trocar::replication {
 
 inline constexpr float kMaxDistanceFromOriginM = 2.0f;
 inline constexpr float kMaxQuaternionError = 1e-3f;
+inline constexpr std::uint32_t kMostRelayed = 100'000;  // people who watch through one relay
 
 // Values of proto::GoodbyeReason, here so that headers need no generated code.
 enum class EndReason : std::uint8_t {
