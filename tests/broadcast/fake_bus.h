@@ -93,7 +93,9 @@ class FakeUpstream final : public relay::Upstream {
   void say(const proto::Envelope& message) override { state_.said.push_back(message); }
   std::string name() const override { return "fake"; }
   bool is_welcome() const override { return state_.is_welcome; }
-  std::uint64_t server_time_us(std::uint64_t now_us) const override { return now_us + state_.ahead_us; }
+  std::uint64_t server_time_us(std::uint64_t now_us) const override {
+    return now_us + state_.ahead_us;
+  }
   std::uint64_t bytes_received() const override { return 0; }
   std::uint64_t returns() const override { return 0; }
 
