@@ -21,7 +21,8 @@
 
 namespace trocar::embed {
 
-// Of the mean edge of the mesh's surface: how far vertices are, and the share kMostBeyond of them.
+// Vertices are so far from the mesh's surface, in its mean edges; the share kMostBeyond of them may
+// be beyond the first, and none is beyond the second.
 inline constexpr double kMostEdgesAway = 0.5, kMostEdgesBeyond = 2;
 inline constexpr double kMostBeyond = 0.05;
 
