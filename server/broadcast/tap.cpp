@@ -33,6 +33,13 @@ std::uint64_t shortening_of(const std::string& id) {
   return std::stoul(id.substr(id.size() - 2), nullptr, 16);
 }
 
+// False: it is no message, or there are several.
+bool read_single_message(BytesView whole, proto::Envelope& message) {
+  const auto messages = split_messages(whole);
+  return messages && messages->size() == 1 &&
+         wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok();
+}
+
 }  // namespace
 
 Tap::Tap(asio::any_io_executor executor, std::unique_ptr<Channel> channel, TapOptions options)
@@ -164,20 +171,14 @@ void Tap::begin(const Piece& last, BytesView whole) {
 }
 
 void Tap::take_pong(BytesView whole) {
-  const auto messages = split_messages(whole);
   proto::Envelope message;
-  if (messages && messages->size() == 1 &&
-      wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok() &&
-      message.has_pong())
+  if (read_single_message(whole, message) && message.has_pong())
     clock_.note(message.pong().client_time_us(), now() / 1000, message.pong().server_time_us());
 }
 
 void Tap::note_goodbye(BytesView whole) {
-  const auto messages = split_messages(whole);
   proto::Envelope message;
-  if (messages && messages->size() == 1 &&
-      wire::decode_envelope(messages->front().subspan(wire::kHeaderBytes), message).ok() &&
-      message.has_goodbye())
+  if (read_single_message(whole, message) && message.has_goodbye())
     goodbye_ = printable(message.goodbye().text(), 200);
 }
 

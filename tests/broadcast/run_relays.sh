@@ -5,16 +5,10 @@
 #
 # Exit code 77: nats-server is missing, or the programs were built without NATS.
 set -euo pipefail
+. "$(dirname "$0")/../support/programs_apart.sh"
 bin=$(cd "$1/bin" && pwd) out=$(realpath -m "$2") scenes=$(cd "$(dirname "$0")/../../deploy/scenes" && pwd)
-command -v nats-server >/dev/null || {
-  echo "relays: SKIPPED: nats-server is missing"
-  exit 77
-}
-rm -rf "$out"
-mkdir -p "$out/run"
-chmod 700 "$out/run"
-cd "$out"
-export XDG_STATE_HOME=$out/state XDG_RUNTIME_DIR=$out/run
+needs relays nats-server
+go_apart "$out"
 port=17910
 url=nats://127.0.0.1:$port
 declare -A pids

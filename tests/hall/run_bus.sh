@@ -4,16 +4,10 @@
 #
 # Exit code 77: nats-server or curl is missing, or the programs were built without NATS.
 set -euo pipefail
+. "$(dirname "$0")/../support/programs_apart.sh"
 bin=$(cd "$1/bin" && pwd) out=$2
-command -v nats-server >/dev/null && command -v curl >/dev/null || {
-  echo "bus: SKIPPED: nats-server or curl is missing"
-  exit 77
-}
-rm -rf "$out"
-mkdir -p "$out/run"
-chmod 700 "$out/run"
-cd "$out"
-export XDG_STATE_HOME=$out/state XDG_RUNTIME_DIR=$out/run
+needs bus nats-server curl
+go_apart "$out"
 port=17790
 url=nats://127.0.0.1:$port
 nats=

@@ -4,16 +4,10 @@
 #
 # Exit code 77: nats-server or openssl is missing, or the programs were built without NATS.
 set -euo pipefail
+. "$(dirname "$0")/../support/programs_apart.sh"
 bin=$(cd "$1/bin" && pwd) out=$2
-command -v nats-server >/dev/null && command -v openssl >/dev/null || {
-  echo "bus_tls: SKIPPED: nats-server or openssl is missing"
-  exit 77
-}
-rm -rf "$out"
-mkdir -p "$out/run"
-chmod 700 "$out/run"
-cd "$out"
-export XDG_STATE_HOME=$out/state XDG_RUNTIME_DIR=$out/run
+needs bus_tls nats-server openssl
+go_apart "$out"
 port=17860 plain_port=17861
 nats=() hall=
 cleanup() {

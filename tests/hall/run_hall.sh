@@ -9,17 +9,11 @@
 #
 # Exit code 77: curl is missing, or a client that was not built.
 set -euo pipefail
+. "$(dirname "$0")/../support/programs_apart.sh"
 test=$1 bin=$(cd "$2/bin" && pwd) out=$3
 root=$(cd "$(dirname "$0")/../.." && pwd)
-command -v curl >/dev/null || {
-  echo "hall: SKIPPED: curl is missing"
-  exit 77
-}
-rm -rf "$out"
-mkdir -p "$out/run"
-chmod 700 "$out/run"
-cd "$out"
-export XDG_STATE_HOME=$out/state XDG_RUNTIME_DIR=$out/run
+needs hall curl
+go_apart "$out"
 hall=
 children=()
 # Servers outlive their hall: each is ended by its own id.

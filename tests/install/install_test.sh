@@ -137,15 +137,14 @@ if [ -e "$root"/usr/lib/python3/dist-packages/trocar.pyi ]; then check "a press 
 
 page() {
   local port answer
-  as ada 'trocar-web --insecure-loopback --listen 127.0.0.1:0 --recordings . --ready-file web-port' &
-  servers+=($!)
+  as ada 'echo $$ >web-pid; exec trocar-web --insecure-loopback --listen 127.0.0.1:0 --recordings . --ready-file web-port' &
   wait_for test -s "$root/home/ada/web-port" || return 1
   port=$(cat "$root/home/ada/web-port")
   exec 3<>"/dev/tcp/127.0.0.1/$port"
   printf 'GET / HTTP/1.1\r\nHost: 127.0.0.1:%s\r\nConnection: close\r\n\r\n' "$port" >&3
   answer=$(tr -d '\0' <&3)
   exec 3>&-
-  kill "${servers[-1]}"
+  kill "$(cat "$root/home/ada/web-pid")"
   grep -q '200 OK' <<<"$answer" && grep -q '<title>' <<<"$answer"
 }
 if inside test -e /usr/bin/trocar-web; then check "the page is served" page; fi

@@ -114,7 +114,9 @@ Status check_hall_start(const HallOptions& options) {
   std::error_code ignored;
   if (fs::exists(config->key_file, ignored))
     if (const auto key = read_key(config->key_file); !key) return key.error();
-  const bool is_made = fs::exists(config->state_folder / "tls" / "hall.crt", ignored);
+  const auto own = config->state_folder / "tls";
+  const bool is_made =
+      fs::exists(own / "hall.crt", ignored) && fs::exists(own / "hall.key", ignored);
   if (config->has_tls && (is_made || !config->certificate_file.empty()))
     if (const auto tls = read_certificate(*config); !tls) return tls.error();
   for (const auto& offer : config->offers)
