@@ -4,14 +4,8 @@
 #include <cstring>
 
 #include "client/render/gl.h"
-
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-#pragma GCC diagnostic ignored "-Wconversion"
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#include <stb_image_write.h>
-#pragma GCC diagnostic pop
+#include "common/base/text_file.h"
+#include "common/image/image.h"
 
 namespace trocar::render {
 
@@ -42,12 +36,9 @@ Image GlContext::read_image() const {
 }
 
 Status write_png(const Image& image, const std::string& path) {
-  const int written = stbi_write_png(path.c_str(), image.size.width, image.size.height, 3,
-                                     image.rgb.data(), image.size.width * 3);
-  if (written == 0)
-    return Error{ErrorCode::ResourceMissing,
-                 path + ": cannot write the screenshot; does the folder exist?"};
-  return {};
+  const auto file = image::encode_png(image.size.width, image.size.height, image.rgb);
+  if (!file) return file.error();
+  return write_text_file(path, *file);
 }
 
 }  // namespace trocar::render

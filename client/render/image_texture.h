@@ -17,8 +17,7 @@ class ImageTexture {
   ImageTexture(const ImageTexture&) = delete;
   ImageTexture& operator=(const ImageTexture&) = delete;
 
-  // A PNG or JPEG file. Error, and then there is no picture: it is neither, larger than
-  // kMostImageSide, unpacks to more than 64 MiB, or has more than 100 scans.
+  // A PNG or JPEG file. Error, and then there is no picture: image::decode() refuses it.
   Status load(const std::string& bytes);
   void clear();
 

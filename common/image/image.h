@@ -1,11 +1,13 @@
 #pragma once
 
-// A picture from the bytes of a PNG or JPEG file, which come from outside: what it may unpack to is
-// bounded. Thread: any.
+// Pictures from the bytes of PNG and JPEG files, which come from outside, and PNG files from
+// pictures. What a file may unpack to is bounded. Thread: any.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +16,7 @@
 namespace trocar::image {
 
 inline constexpr int kMostSide = 2048;  // pixels
+inline constexpr std::size_t kMostFileBytes = std::size_t{64} << 20;
 
 using Pixel = std::array<std::uint8_t, 4>;  // red, green, blue, alpha
 
@@ -27,8 +30,12 @@ struct Image {
   }
 };
 
-// Error: the file is neither PNG nor JPEG, has more than kMostSide along a side, takes or unpacks
-// to more than 64 MiB, or is a JPEG of more than 100 scans, 1,000 tables or 256 codes in a table.
+// Error: the file is neither PNG nor JPEG, is larger than kMostFileBytes, has more than kMostSide
+// along a side, is damaged or cut short, or is a JPEG in CMYK or of more than 500 scans.
 Result<Image> decode(std::string_view file);
+
+// A PNG file of 8 bits a channel. rgb: red, green and blue of each pixel, row by row from the top,
+// 3 * width * height bytes; at least one pixel. Error: there is no memory.
+Result<std::string> encode_png(int width, int height, std::span<const std::uint8_t> rgb);
 
 }  // namespace trocar::image

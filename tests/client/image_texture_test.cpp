@@ -10,40 +10,11 @@
 #include <vector>
 
 #include "client/render/gl_context.h"
-#include "common/image/image.h"
 #include "common/lesson/lesson_texts.h"
 #include "tests/support/files.h"
 
 namespace trocar::render {
 namespace {
-
-// A PNG file of one pixel, whose data unpack to `bytes` of zeros: one, and copies of the 258 before
-// (RFC 1951, 3.2.6).
-std::string png_that_unpacks_to(std::size_t bytes) {
-  std::string data("\x78\x01", 2);
-  unsigned kept = 0, bits = 0;
-  const auto put = [&](const char* code) {
-    for (; *code != 0; ++code) {
-      kept |= static_cast<unsigned>(*code - '0') << bits;
-      if (++bits < 8) continue;
-      data += static_cast<char>(kept);
-      kept = bits = 0;
-    }
-  };
-  put("110");       // the last block, of fixed codes
-  put("00110000");  // a byte of zero
-  for (std::size_t made = 1; made < bytes; made += 258) put("1100010100000");
-  put("000000000000000");  // its end
-  std::string file("\x89PNG\r\n\x1a\n");
-  const auto add = [&](const std::string& kind, const std::string& body) {
-    for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(body.size() >> shift);
-    file += kind + body + "sums";
-  };
-  add("IHDR", std::string("\0\0\0\1\0\0\0\1\x08\0\0\0\0", 13));
-  add("IDAT", data);
-  add("IEND", "");
-  return file;
-}
 
 class ImageTextureTest : public ::testing::Test {
  protected:
@@ -93,74 +64,6 @@ TEST_F(ImageTextureTest, WhatIsTooLargeIsRefused) {
   EXPECT_TRUE(texture.load(png_of(kMostImageSide, 1)));
   EXPECT_FALSE(texture.load(png_of(kMostImageSide + 1, 1)));
   EXPECT_EQ(texture.name(), 0u);
-}
-
-TEST_F(ImageTextureTest, WhatUnpacksToTooMuchIsRefused) {
-  ImageTexture texture;
-  const auto small = texture.load(png_that_unpacks_to(1000));
-  EXPECT_TRUE(small) << small.error().message;
-  EXPECT_FALSE(texture.load(png_that_unpacks_to(std::size_t{80} << 20)));
-  EXPECT_EQ(texture.name(), 0u);
-}
-
-std::string a_jpeg() {
-  for (const auto& picture : lesson::lesson_pictures())
-    if (picture.bytes.starts_with("\xff\xd8")) return std::string(picture.bytes);
-  ADD_FAILURE() << "no lesson has a JPEG";
-  return {};
-}
-
-TEST_F(ImageTextureTest, JpegWithATableOfTooManyCodesIsRefused) {
-  auto jpeg = a_jpeg();
-  const auto table = jpeg.find("\xff\xc4");
-  ASSERT_NE(table, std::string::npos);
-  ImageTexture texture;
-  EXPECT_TRUE(texture.load(jpeg));
-  jpeg[table + 5 + 14] = jpeg[table + 5 + 15] = '\xff';  // of 15 and 16 bits
-  const Status loaded = texture.load(jpeg);
-  ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().message,
-            "picture: a JPEG with a table of more than 256 codes, or too many tables");
-}
-
-// Whatever was in the memory before, a table that is not in the file is empty.
-TEST(Image, ATableThatIsMissingIsEmpty) {
-  std::ifstream in(
-      std::string(TROCAR_SOURCE_DIR) + "/tests/fuzz/seeds/image/table_that_is_missing.jpg",
-      std::ios::binary);
-  const std::string file{std::istreambuf_iterator<char>(in), {}};
-  const auto pixels_after = [&](char left) {
-    std::vector<std::string> blocks;
-    for (std::size_t bytes = 8000; bytes < 28'000; bytes += 500) blocks.emplace_back(bytes, left);
-    blocks.clear();
-    const auto image = image::decode(file);
-    return image.ok() ? image->pixels : std::vector<image::Pixel>{};
-  };
-  const auto first = pixels_after('\0');
-  for (const char left : {'\x55', '\xff', '\7'}) EXPECT_EQ(pixels_after(left), first);
-}
-
-TEST_F(ImageTextureTest, AnErrorIsOneLineWhateverTheFileSays) {
-  auto png = png_of(2, 1);
-  png.replace(png.find("IDAT"), 4, "I\nA\x1b");
-  ImageTexture texture;
-  const Status loaded = texture.load(png);
-  ASSERT_FALSE(loaded);
-  for (const char c : loaded.error().message) EXPECT_GE(c, ' ');
-}
-
-TEST_F(ImageTextureTest, JpegOfManyScansIsRefused) {
-  const auto jpeg = a_jpeg();
-  const auto scan = jpeg.find("\xff\xda"), end = jpeg.rfind("\xff\xd9");
-  std::string many = jpeg.substr(0, end);
-  for (int i = 0; i < 100; ++i) many += jpeg.substr(scan, end - scan);
-  ImageTexture texture;
-  // Bytes of 0xff may come before a marker (B.1.1.2), the first one too.
-  for (const std::string before : {"", "\xff"}) {
-    const Status loaded = texture.load(before + many + jpeg.substr(end));
-    ASSERT_FALSE(loaded);
-    EXPECT_NE(loaded.error().message.find("more than 100 scans"), std::string::npos);
-  }
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "server/organs/picture/organ_picture.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <algorithm>
 
@@ -86,23 +85,6 @@ TEST(OrganPicture, AFineSurfaceTakesTheMeshsPlaceWithItsPicture) {
   EXPECT_LT(at(held, -40, 40)[1], left[1]);
   auto region = draw_organ(mesh, {1, 1, 1, 1}, {0, 0, 0, 0}, square(), painted);
   EXPECT_NE(at(region, -40, 40), left);
-}
-
-TEST(Png, HoldsTheRowsPacked) {
-  const Picture picture{2, 2, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}};
-  const std::string png = to_png(picture);
-  EXPECT_TRUE(png.starts_with("\x89PNG\r\n\x1a\n"));
-  EXPECT_EQ(png.substr(12, 4), "IHDR");
-  EXPECT_EQ(png.substr(png.size() - 8, 4), "IEND");
-  const auto at = png.find("IDAT");
-  ASSERT_NE(at, std::string::npos);
-  std::string rows(14, '\0');
-  uLongf size = rows.size();
-  ASSERT_EQ(
-      uncompress(reinterpret_cast<Bytef*>(rows.data()), &size,
-                 reinterpret_cast<const Bytef*>(png.data() + at + 4), png.size() - at - 4 - 16),
-      Z_OK);
-  EXPECT_EQ(rows, std::string("\0\1\2\3\4\5\6\0\7\10\11\12\13\14", 14));
 }
 
 }  // namespace

@@ -93,7 +93,9 @@ Status draw(const organ::Organ& organ, const std::string& path) {
   }
   const auto picture =
       picture::draw_organ(organ.mesh, organ::material_map(organ).nodes, is_held, fine, painted);
-  if (auto status = write_text_file(path, picture::to_png(picture)); !status) return status;
+  const auto png = image::encode_png(picture.width, picture.height, picture.rgb());
+  if (!png) return png.error();
+  if (auto status = write_text_file(path, *png); !status) return status;
   std::fprintf(stderr, "%s: seen from the front, the left and above; the bar is %.3g mm long\n",
                path.c_str(), 1e3 * picture::scale_bar_m(organ.mesh));
   return {};

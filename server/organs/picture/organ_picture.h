@@ -9,15 +9,32 @@
 // view has a length of 1, 2 or 5 times a power of ten, which scale_bar_m() tells. Drawn by depth
 // buffer, orthographic; the same organ gives the same picture.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/image/image.h"
 #include "common/wire/fine_surface.h"
 #include "server/organs/mesh/tet_mesh.h"
-#include "server/organs/picture/png.h"
 
 namespace trocar::picture {
+
+using Colour = std::array<std::uint8_t, 3>;  // red, green, blue
+
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<Colour> pixels;  // row by row from the top
+
+  Colour& at(int x, int y) {
+    return pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                  static_cast<std::size_t>(x)];
+  }
+  std::span<const std::uint8_t> rgb() const {
+    return {pixels.data()->data(), pixels.size() * sizeof(Colour)};
+  }
+};
 
 // region_of_node: one a node, 0 for the organ's own; is_held: one a node. fine: valid, or empty;
 // painted: its picture, used if it has texture coordinates.
