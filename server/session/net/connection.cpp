@@ -95,6 +95,7 @@ void Connection::begin() {
 
 bool Connection::send(wire::SharedBytes frame) {
   if (state_ != State::Open && state_ != State::Failed) return false;
+  if (is_peer_gone_) return true;
   const std::size_t size = frame->size();
   if (outstanding_ > 0 && outstanding_ + size > outbox_bytes_) return false;
   outstanding_ += size;
@@ -107,7 +108,7 @@ void Connection::close_after_flush(wire::SharedBytes last_words, Clock::time_poi
   if (state_ == State::Draining || state_ == State::Closed) return;
   state_ = State::Draining;
   drain_deadline_ = deadline;
-  if (last_words) {
+  if (last_words && !is_peer_gone_) {
     outstanding_ += last_words->size();
     outbox_.push_back(std::move(last_words));
   }
@@ -226,12 +227,23 @@ asio::awaitable<void> Connection::write_outbox() {
     }
     const auto [error, written] = co_await stream_.write_all(buffers);
     in_flight_.clear();
-    if (error || state_ == State::Closed) break;
+    if (state_ == State::Closed) break;
+    if (error) {
+      stop_writing();
+      co_return;
+    }
     outstanding_ -= std::min(outstanding_, written);
     if (events_.bytes_written) events_.bytes_written(written);
   }
   discard_outbox();
-  close();
+}
+
+// Whoever has gone may have said Bye before: it is read first, and then the reader closes.
+void Connection::stop_writing() {
+  is_peer_gone_ = true;
+  discard_outbox();
+  boost::system::error_code ignored;
+  stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_both, ignored);
 }
 
 }  // namespace trocar::net

@@ -10,6 +10,7 @@
 //
 // While Draining the peer's bytes are read and thrown away: closing a socket with unread bytes
 // makes the kernel send a reset, and the peer could lose the last words that are on their way.
+// Where writing fails, what the peer had said before it went is read to its end.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -73,6 +74,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   // Delivers every complete frame in the buffer; false when nothing more is to be read.
   bool deliver_frames();
   void discard_outbox();
+  void stop_writing();
 
   secure::Stream stream_;
   const std::string peer_address_;
@@ -82,6 +84,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   const wire::SharedBytes plain_reply_;
   Events events_;
   State state_ = State::Greeting;
+  bool is_peer_gone_ = false;  // nothing more can be written
   bool first_message_seen_ = false;
   Clock::time_point last_message_ = Clock::now();
   Clock::time_point drain_deadline_{};

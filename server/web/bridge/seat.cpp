@@ -43,7 +43,7 @@ asio::awaitable<void> Seat::run(const SessionAddress& session) {
   // The session closes a connection whose last guest has left: who comes just then begins another.
   bool is_there = false;
   for (int i = 0; i < kTries && !is_there && !is_last_ && !is_cut_; ++i) {
-    is_lost_ = false;
+    forget_last_try();
     is_there = co_await join(session);
     if (!is_there) co_await leave_carrier();
   }
@@ -65,6 +65,13 @@ asio::awaitable<void> Seat::run(const SessionAddress& session) {
     co_await leave_carrier();
     --bridge_.counters.watchers;
   }
+}
+
+void Seat::forget_last_try() {
+  is_lost_ = is_welcome_ = false;
+  waiting_.clear();
+  waiting_bytes_ = 0;
+  barrier_.reset();
 }
 
 asio::awaitable<void> Seat::finish() {

@@ -55,6 +55,7 @@ class Seat : public std::enable_shared_from_this<Seat> {
   static constexpr std::uint32_t kNoSlot = ~0u;
   static constexpr std::size_t kMostWaitingBytes = 1024 * 1024;
 
+  void forget_last_try();
   asio::awaitable<bool> join(const SessionAddress& session);
   asio::awaitable<bool> say_hello();
   asio::awaitable<void> leave_carrier();
