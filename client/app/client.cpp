@@ -17,8 +17,10 @@
 #include "client/replay/recorded_hand.h"
 #include "client/replay/replay_source.h"
 #include "client/replica/client_messages.h"
+#include "common/base/kept_file.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
+#include "common/base/writable.h"
 #include "common/secure/link_file.h"
 #include "common/secure/loopback.h"
 #include "common/tool/script.h"
@@ -362,6 +364,19 @@ Result<Hands> open_replayed(const ClientOptions& options) {
   return Hands::replayed(std::move(hands));
 }
 
+// Files that are written at the end must not fail only then.
+Status check_end(const ClientOptions& options) {
+  for (const auto& [key, file] : {std::pair{"--screenshot", &options.screenshot_file},
+                                  {"--summary", &options.summary_file},
+                                  {"--hand-trace", &options.trace_file}})
+    if (!file->empty()) {
+      if (auto kept = refuse_to_replace_kept(key, *file); !kept) return kept;
+      if (const auto s = check_writable(*file); !s)
+        return Error{s.error().code, std::string(key) + ": " + s.error().message};
+    }
+  return {};
+}
+
 Result<ExitCode> run_chosen(const ClientOptions& options) {
   Hands hands;
   if (!options.series_folder.empty()) {
@@ -410,6 +425,7 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
 
 // Who hosts a lesson comes back to it from a session, and ends it there.
 Result<ExitCode> run_client(const ClientOptions& options) {
+  if (const auto writable = check_end(options); !writable) return writable.error();
   if (!wants_start_screen(options)) return run_chosen(options);
   ClientOptions chosen = options;
   std::unique_ptr<OwnServer> own;

@@ -14,6 +14,8 @@
 #include <thread>
 #include <vector>
 
+#include "common/base/own_folder.h"
+
 namespace trocar::app {
 namespace {
 
@@ -34,9 +36,9 @@ constexpr auto kGrace = std::chrono::seconds(15);  // until its recording is who
 }
 
 std::string program_path() {
-  std::error_code error;
-  const auto beside = fs::read_symlink("/proc/self/exe", error).parent_path() / "trocar-server";
-  return fs::exists(beside, error) ? beside.string() : "trocar-server";
+  std::error_code ignored;
+  const auto beside = own_folder() / "trocar-server";
+  return fs::exists(beside, ignored) ? beside.string() : "trocar-server";
 }
 
 }  // namespace

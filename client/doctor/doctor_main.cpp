@@ -11,6 +11,7 @@
 #include "common/base/cpu.h"
 #include "common/base/log.h"
 #include "common/base/number_option.h"
+#include "common/base/stdout_check.h"
 #include "common/base/version.h"
 #include "common/discovery/finder.h"
 #include "common/secure/join_code.h"
@@ -134,5 +135,5 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(trocar::doctor::kProgram);
-  return trocar::doctor::run(argc, argv);
+  return trocar::finish_output(trocar::doctor::kProgram, trocar::doctor::run(argc, argv));
 }

@@ -1,7 +1,6 @@
 #include "common/journal/mcap_copy.h"
 
-#include <filesystem>
-
+#include "common/base/unfinished_file.h"
 #include "common/journal/mcap_writer.h"
 
 namespace trocar::journal {
@@ -44,14 +43,14 @@ Status copy(McapReader& reader, McapWriter& writer, const MessageChange& change,
 
 Result<ReadReport> copy_recording(McapReader& reader, const std::string& to,
                                   const MessageChange& change, const McapMetadata& note) {
-  auto created = McapWriter::create(to, reader.header());
+  if (auto is_free = UnfinishedFile::refuse_existing(to); !is_free) return is_free.error();
+  const auto part = UnfinishedFile::name_for(to);
+  auto created = McapWriter::create(part, reader.header());
   if (!created) return created.error();
+  UnfinishedFile file(part);
   ReadReport report;
-  if (const auto copied = copy(reader, **created, change, note, report); !copied) {
-    std::error_code ignored;
-    std::filesystem::remove(to, ignored);
-    return copied.error();
-  }
+  if (auto copied = copy(reader, **created, change, note, report); !copied) return copied.error();
+  if (auto named = file.rename_to_new(to); !named) return named.error();
   return report;
 }
 

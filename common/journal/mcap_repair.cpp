@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/journal/mcap_copy.h"
+#include "common/journal/session_topics.h"
 
 namespace trocar::journal {
 
@@ -10,9 +11,18 @@ Result<RepairReport> repair(const std::string& from, const std::string& to) {
   auto opened = McapReader::open(from);
   if (!opened) return opened.error();
   auto& reader = **opened;
-  const auto found = reader.read({}, {}, [](const McapMessage&) { return true; });
+  bool has_organ = false;
+  const auto found = reader.read({}, {}, [&](const McapMessage& message) {
+    has_organ |= reader.channels().at(message.channel_id).topic == topic_name(JournalTopic::Organ);
+    return true;
+  });
   if (reader.is_finished() && found.status().ok())
     return Error{ErrorCode::Usage, from + ": is whole, there is nothing to repair"};
+  if (reader.header().profile == kJournalProfile && !has_organ)
+    return Error{ErrorCode::BadFile,
+                 from +
+                     ": no organ; the recording ended too early, or is damaged there, and cannot "
+                     "be repaired"};
   const RepairReport report{.messages = found.messages,
                             .dropped_bytes = reader.dropped_bytes(),
                             .damaged_chunks = found.damaged_chunks};

@@ -20,7 +20,8 @@ struct RepairReport {
   std::uint64_t damaged_chunks = 0;  // left out
 };
 
-// `to` must not exist. An error of usage if nothing is wrong with `from`.
+// `to` must not exist. Errors: Usage if nothing is wrong with `from`; BadFile if it is of a session
+// and its organ is lost, without which nothing can use it.
 Result<RepairReport> repair(const std::string& from, const std::string& to);
 
 }  // namespace trocar::journal

@@ -48,13 +48,16 @@ Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::string& path,
   const int create_flags = is_device(path) ? 0 : O_CREAT | O_EXCL;
   const int fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | create_flags, 0644);
   if (fd < 0 && errno == EEXIST)
-    return Error{ErrorCode::ResourceMissing,
+    return Error{ErrorCode::BadFile,
                  path + ": exists already; choose another name or move it away"};
   if (fd < 0) return io_error(path, "create");
   std::unique_ptr<McapWriter> writer(new McapWriter(path, fd, options));
   Bytes start(kMcapMagic.begin(), kMcapMagic.end());
   put_header(start, header);
-  if (Status written = writer->append(start); !written.ok()) return written.error();
+  if (Status written = writer->append(start); !written.ok()) {
+    if (create_flags != 0) ::unlink(path.c_str());
+    return written.error();
+  }
   if (options.sync_ns > 0) sync_folder_of(path);
   return writer;
 }

@@ -36,7 +36,8 @@ struct McapWriterOptions {
 
 class McapWriter {
  public:
-  // Fails if a file of that name exists: a recording is never overwritten. (A device may exist.)
+  // Error (BadFile) if a file of that name exists: a recording is never overwritten. (A device may
+  // exist.) Nothing is left where the first bytes cannot be written.
   static Result<std::unique_ptr<McapWriter>> create(const std::string& path,
                                                     const McapHeader& header,
                                                     const McapWriterOptions& options = {});

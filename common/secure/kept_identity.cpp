@@ -39,10 +39,13 @@ Result<KeptIdentity> read_or_make_identity(const std::string& certificate_file,
     if (!own) return own.error();
     return KeptIdentity{std::move(*own), (folder / (name + ".crt")).string()};
   }
+  std::error_code ignored;
   auto certificate = read_small_file(certificate_file);
   if (!certificate) return certificate.error();
   auto key = read_small_file(key_file);
   if (!key) return key.error();
+  if ((fs::status(key_file, ignored).permissions() & fs::perms::others_read) != fs::perms::none)
+    log::warn("{}: others on this machine can read this key: chmod 600", key_file);
   return KeptIdentity{{std::move(*certificate), std::move(*key)},
                       "--certificate, --key: " + certificate_file};
 }

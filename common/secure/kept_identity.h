@@ -18,7 +18,7 @@ struct KeptIdentity {
 
 // Reads both files of --certificate and --key, if they are given, or NAME.crt and NAME.key in
 // `folder`, which is a private one and where they are made if they are missing. An error names the
-// file that cannot be read or written.
+// file that cannot be read or written. The log warns of a given key that others can read.
 Result<KeptIdentity> read_or_make_identity(const std::string& certificate_file,
                                            const std::string& key_file,
                                            const std::filesystem::path& folder,

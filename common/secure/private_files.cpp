@@ -12,6 +12,8 @@
 #include <iterator>
 #include <vector>
 
+#include "common/base/writable.h"
+
 namespace trocar::secure {
 namespace {
 
@@ -35,6 +37,12 @@ bool others_may_read(const fs::path& path) {
   return (status.st_mode & kOthers) != 0 || status.st_uid != ::geteuid();
 }
 
+Status check_private(const fs::path& folder) {
+  if (!others_may_read(folder)) return {};
+  return Error{ErrorCode::BadFile,
+               folder.string() + ": others may look into it: make it yours and chmod 700"};
+}
+
 }  // namespace
 
 Result<fs::path> default_state_folder() {
@@ -43,7 +51,7 @@ Result<fs::path> default_state_folder() {
   if (const auto home = folder_of_variable("HOME"); !home.empty())
     return home / ".local" / "state" / "trocar";
   return Error{ErrorCode::ResourceMissing,
-               "HOME and XDG_STATE_HOME are not set: name a state folder with --state"};
+               "HOME and XDG_STATE_HOME are not set: set one of them, or name a state folder"};
 }
 
 std::vector<fs::path> link_folders() {
@@ -58,14 +66,17 @@ Status make_private_folder(const fs::path& folder) {
   std::error_code error;
   if (folder.has_parent_path()) fs::create_directories(folder.parent_path(), error);
   if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST)
-    return missing(folder, "cannot be made", "name another folder with --state");
+    return missing(folder, "cannot be made", "name another state folder");
   if (!fs::is_directory(folder, error))
     return Error{ErrorCode::ResourceMissing,
-                 folder.string() + ": is no folder: name another one with --state"};
-  if (others_may_read(folder))
-    return Error{ErrorCode::BadFile,
-                 folder.string() + ": others may look into it: make it yours and chmod 700"};
-  return {};
+                 folder.string() + ": is no folder: name another state folder"};
+  return check_private(folder);
+}
+
+Status check_private_folder(const fs::path& folder) {
+  std::error_code ignored;
+  if (const auto fine = check_writable_folder(folder); !fine) return fine;
+  return fs::exists(folder, ignored) ? check_private(folder) : Status();
 }
 
 Status write_private_file(const fs::path& path, std::string_view text) {

@@ -22,6 +22,8 @@ std::vector<std::filesystem::path> link_folders();
 // Makes it and what is missing above it; an error if it is another user's, or others may look into
 // it.
 Status make_private_folder(const std::filesystem::path& folder);
+// Says whether make_private_folder() would succeed, without making anything.
+Status check_private_folder(const std::filesystem::path& folder);
 Status write_private_file(const std::filesystem::path& path, std::string_view text);
 // An error if it is not there, larger than 1 MiB, or others may read it.
 Result<std::string> read_private_file(const std::filesystem::path& path);

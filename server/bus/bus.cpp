@@ -282,6 +282,13 @@ Bus::~Bus() {
   nats_Open(-1);
 }
 
+Status Bus::check(const BusPlace& place) {
+  if (auto sound = check_place(place); !sound) return sound;
+  Parts parts;
+  parts.place = place;
+  return parts.make_options("check");
+}
+
 Result<std::unique_ptr<Bus>> Bus::connect(const BusPlace& place, const std::string& name,
                                           bool is_patient) {
   if (const auto sound = check_place(place); !sound) return sound.error();
@@ -331,7 +338,7 @@ bool Bus::publish(const std::string& subject, const std::string& text,
 }
 
 std::vector<std::string> Bus::ask_all(const std::string& subject, const std::string& text,
-                                      milliseconds wait) {
+                                      milliseconds wait, milliseconds first_wait) {
   const std::shared_lock guard(parts_->lock);
   std::vector<std::string> answers;
   natsInbox* inbox = nullptr;
@@ -341,13 +348,16 @@ std::vector<std::string> Bus::ask_all(const std::string& subject, const std::str
   if (status == NATS_OK)
     status = natsConnection_PublishRequestString(parts_->connection, subject.c_str(), inbox,
                                                  text.c_str());
-  const auto end = Clock::now() + wait;
+  auto end = Clock::now() + first_wait;
   while (status == NATS_OK && Clock::now() < end) {
     const auto left = std::chrono::ceil<milliseconds>(end - Clock::now());
     natsMsg* message = nullptr;
     status = natsSubscription_NextMsg(&message, made, left.count());
     if (status != NATS_OK) break;
-    if (auto answer = text_of(message); !answer.empty()) answers.push_back(std::move(answer));
+    if (auto answer = text_of(message); !answer.empty()) {
+      if (answers.empty()) end = Clock::now() + wait;
+      answers.push_back(std::move(answer));
+    }
     natsMsg_Destroy(message);
   }
   natsSubscription_Destroy(made);
@@ -381,10 +391,13 @@ struct Bus::Parts {};
 Bus::Bus(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Bus::~Bus() = default;
 
-Result<std::unique_ptr<Bus>> Bus::connect(const BusPlace&, const std::string&, bool) {
+Status Bus::check(const BusPlace&) {
   return Error{ErrorCode::Usage,
                "--nats: these programs were built without NATS: install libnats-dev, and build "
                "them again"};
+}
+Result<std::unique_ptr<Bus>> Bus::connect(const BusPlace& place, const std::string&, bool) {
+  return check(place).error();
 }
 Status Bus::subscribe(const std::string&, Take) {
   return {};
@@ -393,7 +406,7 @@ bool Bus::publish(const std::string&, const std::string&, const std::string&) {
   return false;
 }
 std::vector<std::string> Bus::ask_all(const std::string&, const std::string&,
-                                      std::chrono::milliseconds) {
+                                      std::chrono::milliseconds, std::chrono::milliseconds) {
   return {};
 }
 Result<std::string> Bus::ask(const std::string&, const std::string&, std::chrono::milliseconds) {

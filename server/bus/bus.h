@@ -39,15 +39,19 @@ class Bus {
   static Result<std::unique_ptr<Bus>> connect(const BusPlace& place, const std::string& name,
                                               bool is_patient);
   ~Bus();
+  // Says whether connect() would find something wrong before it reaches out: the URL, a file, or no
+  // NATS in this build.
+  static Status check(const BusPlace& place);
 
   // `take` is kept until the end.
   Status subscribe(const std::string& subject, Take take);
   // False: there is no connection now, or the text is too long.
   bool publish(const std::string& subject, const std::string& text,
                const std::string& answer_to = "");
-  // All answers that come within `wait`.
+  // All answers that come within `wait` after the first one, which may take `first_wait`.
   std::vector<std::string> ask_all(const std::string& subject, const std::string& text,
-                                   std::chrono::milliseconds wait);
+                                   std::chrono::milliseconds wait,
+                                   std::chrono::milliseconds first_wait);
   // The first answer. ErrorCode::ResourceMissing: none comes.
   Result<std::string> ask(const std::string& subject, const std::string& text,
                           std::chrono::milliseconds deadline);

@@ -15,16 +15,14 @@ Status check_place(const BusPlace& place) {
   for (std::size_t begin = 0; begin <= url.size();) {
     const auto comma = std::min(url.find(',', begin), url.size());
     const auto address = url.substr(begin, comma - begin);
-    const auto scheme = address.find("://");
     const bool is_tls = address.starts_with("tls://");
-    const bool is_known = address.starts_with("nats://") || is_tls ||
-                          (scheme == std::string::npos && address.find(' ') == std::string::npos);
-    if (!is_known)
-      return Error{ErrorCode::Usage,
-                   "--nats: '" + address + "' is neither nats://HOST:PORT nor tls://HOST:PORT"};
     if (is_tls != place.wants_tls())
       return Error{ErrorCode::Usage,
                    "--nats: '" + url + "' has addresses with tls:// and others without"};
+    const bool is_known = is_tls || address.starts_with("nats://");
+    if (!is_known || address.ends_with("//") || address.find(' ') != std::string::npos)
+      return Error{ErrorCode::Usage,
+                   "--nats: '" + address + "' is neither nats://HOST:PORT nor tls://HOST:PORT"};
     begin = comma + 1;
   }
   if (!place.ca_file.empty() && !place.wants_tls())

@@ -33,7 +33,10 @@ struct FrameArrays {
 class Recording {
  public:
   explicit Recording(const std::filesystem::path& path)
-      : path_(path.string()), journal_(value_of(SessionJournal::open(path_))) {}
+      : path_(path.string()), journal_(value_of(SessionJournal::open(path_))) {
+    // One that was cut before the organ's end would be read as an empty one.
+    if (const auto organ = journal_->organ(); !organ) raise(organ.error());
+  }
 
   SessionJournal& journal() const { return *open(); }
   const journal::SessionInfo& info() const { return open()->info(); }

@@ -87,7 +87,10 @@ asio::awaitable<void> Uplink::run() {
                                     "eight characters and the address");
       break;
     }
-    if (!is_open) why_ = link_->why();
+    if (!is_open) {
+      why_ = link_->why();
+      say_waiting();
+    }
     if (is_open) co_await talk();
     if (is_over_) break;
     if (std::exchange(is_welcome_, false)) {
@@ -104,6 +107,13 @@ asio::awaitable<void> Uplink::run() {
     co_await pause_.async_wait(kNoThrow);
     pause = std::min(pause + pause / 2, kLongestPause);
   }
+}
+
+// Once, and not to who was in the session before.
+void Uplink::say_waiting() {
+  if (was_welcome_ || std::exchange(has_said_waiting_, true)) return;
+  log::info("no server at {} yet ({}): trying for {} s", options_.server.name, why_,
+            std::chrono::ceil<std::chrono::seconds>(options_.reach_deadline).count());
 }
 
 asio::awaitable<void> Uplink::talk() {

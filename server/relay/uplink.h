@@ -70,6 +70,7 @@ class Uplink final : public Upstream {
   asio::awaitable<void> ping_often();
   void spawn_talker(asio::awaitable<void> work);
   void say_hello();
+  void say_waiting();
   // False: nothing more is to be read.
   bool take(const Bytes& body);
   bool take_goodbye(const proto::Goodbye& goodbye);
@@ -88,6 +89,7 @@ class Uplink final : public Upstream {
   std::size_t upward_bytes_ = 0;
   std::string token_, why_;
   bool is_welcome_ = false, was_welcome_ = false, is_talking_ = false, is_over_ = false;
+  bool has_said_waiting_ = false;
   int talkers_ = 0, number_ = 1;
   std::uint64_t returns_ = 0, heard_ns_ = 0, deadline_ns_ = 0;
   asio::steady_timer pause_, has_mail_, next_ping_, talkers_ended_;

@@ -157,6 +157,8 @@ def main():
     expect(len(storage.requests) == count, f"asked for: {storage.requests[count:]}")
     code, said = push(small, "s3://lessons/new", *at, environment={**keys, "AWS_SECRET_ACCESS_KEY": "another"})
     expect(code == 4 and "403" in said and "another" not in said, f"wrong key: {code} {said}")
+    expect(all(words in said for words in ("AWS_SECRET_ACCESS_KEY", f"region {REGION}", "bucket lessons")) and
+           len(said.splitlines()) == 1, f"nothing to do: {said}")
     code, said = push(small, "s3://other-bucket", *at)
     expect(code != 0, f"no bucket: {code} {said}")
     code, said = push(small, "s3://lessons", "--endpoint", "http://127.0.0.1:1")

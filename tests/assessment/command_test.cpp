@@ -86,6 +86,46 @@ TEST_F(AssessCommand, AFolderGivesLearningCurves) {
   EXPECT_EQ(Json::parse(read(at("x.json"))).size(), 4u);
 }
 
+TEST_F(AssessCommand, AFolderIsReadWithThoseBelowItAndWhatCannotBeReadIsNamed) {
+  for (const char* folder : {"all", "all/one", "all/two"})
+    std::filesystem::create_directories(at(folder));
+  recorded("all/one/session.mcap", 2.5f);
+  recorded("all/two/session.mcap", 1);
+  write("all/empty.mcap", "");
+  write("all/two/foreign.mcap", "no recording at all");
+  std::filesystem::create_symlink("nowhere", at("all/gone.mcap"));
+  EXPECT_EQ(run({"assess", at("all"), "--csv", at("all.csv")}), 3);
+  for (const char* says : {"all/empty.mcap: ", "all/two/foreign.mcap: ", "62 points", "100 points",
+                           "  one/session.mcap\n", "  two/session.mcap\n"})
+    EXPECT_NE(log().find(says), std::string::npos) << says << " in " << log();
+  EXPECT_NE(read(at("all.csv")).find("\"one/session.mcap\","), std::string::npos);
+  for (const char* bad : {"all/one/session.mcap", "all/two/session.mcap"})
+    std::filesystem::remove(at(bad));
+  EXPECT_EQ(run({"assess", at("all"), "--csv", at("none.csv")}), 3);
+  EXPECT_FALSE(std::filesystem::exists(at("none.csv")));
+}
+
+TEST_F(AssessCommand, NoOutputTakesThePlaceOfARecordingOrOfAnotherOne) {
+  const auto file = recorded("one.mcap", 2);
+  const auto before = read(file);
+  for (const char* option : {"--html", "--pdf", "--csv", "--xapi"}) {
+    EXPECT_EQ(run({"assess", file, option, file}), 2);
+    expect_line(std::string(option) + ": " + file + " is a recording");
+  }
+  EXPECT_EQ(read(file), before);
+  EXPECT_EQ(run({"assess", file, "--html", at("x"), "--csv", at("x")}), 2);
+  expect_line("--html and --csv: ");
+  EXPECT_FALSE(std::filesystem::exists(at("x")));
+}
+
+TEST_F(AssessCommand, OptionsThatWouldDoNothingAreRefused) {
+  const auto file = recorded("one.mcap", 2);
+  EXPECT_EQ(run({"assess", file, "--pictures"}), 2);
+  expect_line("--html or --pdf");
+  EXPECT_EQ(run({"assess", file, "--home-page", "http://x.example"}), 2);
+  expect_line("--xapi");
+}
+
 TEST_F(AssessCommand, RefusesInOneLine) {
   EXPECT_EQ(run({"assess", at("none.mcap")}), 3);
   expect_line("none.mcap");

@@ -18,6 +18,7 @@ namespace {
 Assessment session_of(double time_s, double economy) {
   Assessment session;
   session.file = "folder/a.mcap";
+  session.name = "a.mcap";
   session.start_utc_ns = 1'700'000'000'000'000'000;
   session.lesson.emplace();
   session.lesson->title = "Lift it";

@@ -19,7 +19,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <sstream>
 #include <thread>
@@ -35,6 +34,7 @@
 #include "server/web/bridge/bridge.h"
 #include "server/web/bridge/session_link.h"
 #include "tests/support/child_program.h"
+#include "tests/support/process_cpu.h"
 
 namespace trocar {
 namespace {
@@ -42,7 +42,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Program;
 
-constexpr double kStartSeconds = 60, kTicksPerSecondOfProc = 100;
+constexpr double kStartSeconds = 60;
 constexpr std::uint64_t kPingNs = 500'000'000;
 constexpr std::chrono::milliseconds kLookPeriod{10}, kRetry{200};
 
@@ -54,23 +54,6 @@ struct Options {
   std::string nats;  // URL; empty: each relay hangs on the server
   unsigned threads = 1;
 };
-
-std::string read_text(const fs::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-// CPU seconds of the thread that a process began with, which is the network's.
-double cpu_seconds_of(pid_t process) {
-  const auto id = std::to_string(process);
-  const auto text = read_text("/proc/" + id + "/task/" + id + "/stat");
-  std::istringstream fields(text.substr(text.rfind(')') + 2));
-  std::string field;
-  double user = 0, system = 0;
-  for (int i = 0; i < 11; ++i) fields >> field;
-  fields >> user >> system;
-  return (user + system) / kTicksPerSecondOfProc;
-}
 
 // Figures of a program on this machine, as /metrics has them; empty if it does not answer.
 std::string figures_at(std::uint16_t port) {
@@ -250,11 +233,13 @@ class Crowd {
     return ports_.size() > 1 ? std::vector<std::uint16_t>(ports_.begin() + 1, ports_.end())
                              : ports_;
   }
-  double cpu_of_server() const { return cpu_seconds_of(programs_.front()->process()); }
+  double cpu_of_server() const {
+    return testing::cpu_seconds_of_first_thread(programs_.front()->process());
+  }
   double cpu_of_relays() const {
     double seconds = 0;
     for (std::size_t i = 1; i < programs_.size(); ++i)
-      seconds += cpu_seconds_of(programs_[i]->process());
+      seconds += testing::cpu_seconds_of_first_thread(programs_[i]->process());
     return seconds;
   }
   double bytes_of_server() const {
@@ -289,9 +274,9 @@ class Crowd {
     int port = 0;
     for (int i = 0; i < kStartSeconds * 20 && port == 0; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      port = std::atoi(read_text(ready).c_str());
+      port = std::atoi(testing::load_text(ready).c_str());
     }
-    if (port == 0) std::fputs(read_text(folder_ / (name + ".log")).c_str(), stderr);
+    if (port == 0) std::fputs(testing::load_text(folder_ / (name + ".log")).c_str(), stderr);
     ports_.push_back(static_cast<std::uint16_t>(port));
   }
 

@@ -20,6 +20,7 @@
 
 #include "common/plot/plot.h"
 #include "tests/support/child_program.h"
+#include "tests/support/files.h"
 
 namespace trocar {
 namespace {
@@ -85,15 +86,10 @@ std::vector<Condition> conditions(bool is_short) {
   return all;
 }
 
-std::string read_text(const fs::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 // The port that a program has written; empty if it did not start.
 std::string wait_for_port(const fs::path& file) {
   for (int i = 0; i < static_cast<int>(kStartSeconds * 20); ++i) {
-    std::string port = read_text(file);
+    std::string port = testing::load_text(file);
     if (const auto end = port.find('\n'); end != std::string::npos) return port.substr(0, end);
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
@@ -197,11 +193,13 @@ Row run(const Options& options, const Condition& condition, bool has_datagrams) 
   network.signal(SIGTERM);
   network.wait(5);
   for (int i = 0; i < condition.hands; ++i) {
-    auto summary = Json::parse(read_text(folder / (kHands[static_cast<std::size_t>(i)] + ".json")),
-                               nullptr, false);
+    auto summary =
+        Json::parse(testing::load_text(folder / (kHands[static_cast<std::size_t>(i)] + ".json")),
+                    nullptr, false);
     if (!summary.is_discarded()) summaries.push_back(std::move(summary));
   }
-  const auto server_summary = Json::parse(read_text(folder / "server.json"), nullptr, false);
+  const auto server_summary =
+      Json::parse(testing::load_text(folder / "server.json"), nullptr, false);
   if (ended != 0 || server_summary.is_discarded() || summaries.empty()) {
     std::fprintf(stderr, "%s: %s: the session failed, see %s\n", kProgram, condition.name.c_str(),
                  folder.c_str());

@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <memory>
-#include <sstream>
 #include <thread>
 
 #include "client/net/net_source.h"
@@ -21,6 +20,7 @@
 #include "common/base/timing.h"
 #include "common/secure/link_file.h"
 #include "tests/support/child_program.h"
+#include "tests/support/process_cpu.h"
 
 namespace trocar {
 namespace {
@@ -29,7 +29,6 @@ namespace fs = std::filesystem;
 using testing::Program;
 
 constexpr double kStartSeconds = 60, kSettleSeconds = 8;
-constexpr double kTicksPerSecondOfProc = 100;
 
 enum class Kind { Datagrams, Tls, Plain };
 const char* name_of(Kind kind) {
@@ -53,23 +52,6 @@ struct Watcher {
   replica::Replica replica;
 };
 
-std::string read_text(const fs::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-// CPU seconds of the thread that a process began with: the server's network thread.
-double cpu_seconds_of(pid_t process) {
-  const auto id = std::to_string(process);
-  const auto text = read_text("/proc/" + id + "/task/" + id + "/stat");
-  std::istringstream fields(text.substr(text.rfind(')') + 2));
-  std::string field;
-  double user = 0, system = 0;
-  for (int i = 0; i < 11; ++i) fields >> field;
-  fields >> user >> system;
-  return (user + system) / kTicksPerSecondOfProc;
-}
-
 double resident_mb_of(pid_t process) {
   double pages = 0;
   std::ifstream("/proc/" + std::to_string(process) + "/statm") >> pages >> pages;
@@ -89,7 +71,7 @@ class Session {
     server_ = std::make_unique<Program>("trocar-server", arguments, folder_ / "server.log");
     for (int i = 0; i < kStartSeconds * 20 && port_ == 0; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      port_ = static_cast<std::uint16_t>(std::atoi(read_text(folder_ / "port").c_str()));
+      port_ = static_cast<std::uint16_t>(std::atoi(testing::load_text(folder_ / "port").c_str()));
     }
     static const std::vector<std::string> kHands{"palpate", "press",   "stroke", "lift",
                                                  "probe",   "spatula", "tug",    "slices"};
@@ -191,9 +173,9 @@ void run(const Options& options, Kind kind, int count) {
     return static_cast<double>(bytes);
   };
   is_counting = true;
-  const double cpu = cpu_seconds_of(session.process()), bytes = received();
+  const double cpu = testing::cpu_seconds_of_first_thread(session.process()), bytes = received();
   std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));
-  const double cpu_used = cpu_seconds_of(session.process()) - cpu;
+  const double cpu_used = testing::cpu_seconds_of_first_thread(session.process()) - cpu;
   const double bytes_got = received() - bytes, memory = resident_mb_of(session.process());
   is_stopped = true;
   for (auto& thread : threads) thread.join();

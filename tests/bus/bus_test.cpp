@@ -39,7 +39,8 @@ TEST(BusPlace, needs_tls_for_all_addresses_or_none_and_for_a_certificate) {
             std::string::npos);
   EXPECT_NE(refusal_of({.url = "tls://127.0.0.1:1,127.0.0.1:2"}).find("others without"),
             std::string::npos);
-  for (const char* url : {"TLS://127.0.0.1:1", "nats://127.0.0.1:1, tls://127.0.0.1:2", "http://a"})
+  for (const char* url : {"TLS://127.0.0.1:1", "nats://127.0.0.1:1, tls://127.0.0.1:2", "http://a",
+                          "foo", "127.0.0.1:4222", "nats://"})
     EXPECT_NE(refusal_of({.url = url}).find("is neither"), std::string::npos) << url;
   EXPECT_NE(refusal_of({.url = "nats://127.0.0.1:1", .ca_file = "ca.pem"}).find("needs --nats tls"),
             std::string::npos);

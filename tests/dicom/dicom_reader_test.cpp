@@ -5,7 +5,9 @@
 
 #include <fstream>
 #include <functional>
+#include <numeric>
 #include <random>
+#include <vector>
 
 #include "tests/dicom/dicom_sample.h"
 #include "tests/support/files.h"
@@ -156,6 +158,15 @@ TEST_F(DicomReader, SaysWhatIsWrongWithASeries) {
   empty();
   series(-1, [](DcmItem& data, int) { put(data, DCM_RescaleIntercept, "-1024"); });
   EXPECT_NE(error_of(folder_).find("it holds grey values, not labels"), std::string::npos);
+  empty();
+  series(-1, [](DcmItem& data, int k) {
+    std::vector<Uint16> greys(kColumns * kRows);
+    std::iota(greys.begin(), greys.end(), static_cast<Uint16>(k * kColumns * kRows));
+    ASSERT_TRUE(data.putAndInsertUint16Array(DCM_PixelData, greys.data(), greys.size()).good());
+  });
+  EXPECT_EQ(error_of(folder_),
+            "has more than 256 values: it holds grey values, not labels, so "
+            "segment it first, in 3D Slicer for instance");
   empty();
   series(-1, [](DcmItem& data, int k) { put(data, DCM_ImagePositionPatient, place(k / 2)); });
   EXPECT_EQ(error_of(folder_), "5 slices stand at 3 places: it is more than one series");

@@ -219,6 +219,46 @@ TEST(Fit, WhatCannotBeFittedIsSaid) {
 }
 
 // Constants of a measured material are not moduli that a scenario could have.
+TEST(Fit, AMaterialOfNoTissueIsRefused) {
+  const auto in_regions = [](const char* own, const char* of_region) {
+    return pulled_static(std::string("young_modulus_pa = ") + own +
+                         "\n[[region]]\nset = \"all\"\nname = \"core\"\n"
+                         "young_modulus_pa = " +
+                         of_region + "\n");
+  };
+  const auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
+  const auto resolved = expect_resolved(in_regions("4000", "5000"));
+  const auto fitted = fit(resolved, measured, {});
+  ASSERT_FALSE(fitted.ok());
+  EXPECT_NE(fitted.error().message.find("does not depend on young_modulus_pa"), std::string::npos)
+      << fitted.error().message;
+  EXPECT_NE(fitted.error().message.find("--region with one of core"), std::string::npos)
+      << fitted.error().message;
+  FitOptions options;
+  options.region = "core";
+  const auto of_region = fit(resolved, measured, options);
+  ASSERT_TRUE(of_region.ok()) << of_region.error().message;
+  EXPECT_NEAR(of_region->parameters[0].value, 6000, 6);
+  EXPECT_TRUE(of_region->remarks().empty()) << of_region->remarks().front();
+}
+
+TEST(Fit, ForcesOfTheWrongSignAreRemarkedOn) {
+  auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
+  for (auto& point : measured.points) point.force_n = -point.force_n;
+  const auto fitted =
+      fit(expect_resolved(pulled_static("young_modulus_pa = 4000\n")), measured, {});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_EQ(fitted->parameters[0].at, FittedParameter::Limit::Lower);
+  const auto remarks = fitted->remarks();
+  ASSERT_EQ(remarks.size(), 2u);
+  EXPECT_TRUE(remarks[0].starts_with("young_modulus_pa ends at its lower limit, 1: "))
+      << remarks[0];
+  EXPECT_TRUE(remarks[1].starts_with("the residual is ")) << remarks[1];
+  const auto toml = to_toml(*fitted, {});
+  EXPECT_TRUE(toml.starts_with("# Warning: young_modulus_pa ends at ")) << toml;
+  EXPECT_NE(toml.find(".\n[material]\n"), std::string::npos) << toml;
+}
+
 TEST(Fit, AMeasuredMaterialIsLeftToItsOwnIdentification) {
   const MeasuredCurve measured{"measured.csv", false, {{0.001, 0.1, 0, 2}, {0.002, 0.2, 0, 3}}};
   const auto resolved = expect_resolved(

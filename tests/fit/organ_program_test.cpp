@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <iomanip>
+#include <sstream>
 #include <string_view>
 
 #include "server/organs/organ/organ_file.h"
@@ -98,6 +101,46 @@ TEST_F(OrganProgram, AFineSurfaceIsTurnedFromItsAxesToThoseOfTheOtherFile) {
   expect_line("lps.stl: says that its axes are LPS, and ");
   EXPECT_EQ(embed(unsaid, lps, "file"), 0) << log();
   EXPECT_EQ(embed(lps, unsaid), 0) << log();
+}
+
+TEST_F(OrganProgram, NothingTakesThePlaceOfWhatItWasMadeFrom) {
+  ASSERT_EQ(run({"export", "liver", "--unit", "mm", "--out", at("own.stl")}), 0) << log();
+  const auto size = std::filesystem::file_size(at("own.stl"));
+  EXPECT_EQ(run({"import", at("own.stl"), "--unit", "mm", "--out", at("own.stl")}), 2);
+  expect_line("own.stl: the file's name must end with .organ");
+  ASSERT_EQ(
+      run({"import", at("own.stl"), "--unit", "mm", "--nodes", "500", "--out", at("a.organ")}), 0)
+      << log();
+  EXPECT_EQ(run({"inspect", at("a.organ"), "--picture", at("a.organ")}), 2);
+  expect_line("a.organ: the file's name must end with .png");
+  EXPECT_EQ(run({"export", at("a.organ"), "--unit", "mm", "--out", at("own.stl")}), 2);
+  expect_line("own.stl: the organ was made from a file of this name");
+  EXPECT_EQ(run({"make", "plate", "--out", at("own.stl")}), 2);
+  EXPECT_EQ(std::filesystem::file_size(at("own.stl")), size);
+}
+
+TEST_F(OrganProgram, AnOrganFarAwayIsNotWrittenInShortNumbers) {
+  ASSERT_EQ(run({"make", "plate", "--out", at("plate.organ")}), 0);
+  ASSERT_EQ(run({"export", at("plate.organ"), "--out", at("near.msh")}), 0) << log();
+  std::ifstream in(at("near.msh"));
+  std::string far;
+  bool is_node = false;
+  for (std::string line; std::getline(in, line); far += line + "\n") {
+    if (line == "$EndNodes") is_node = false;
+    std::istringstream words(line);
+    int id = 0;
+    double x = 0, y = 0, z = 0;
+    if (is_node && words >> id >> x >> y >> z) {
+      std::ostringstream moved;
+      moved << std::setprecision(17) << id << ' ' << x + 1e5 << ' ' << y << ' ' << z;
+      line = moved.str();
+    }
+    if (line == "$Nodes") is_node = true;
+  }
+  ASSERT_EQ(run({"import", write("far.msh", far), "--out", at("far.organ")}), 0) << log();
+  EXPECT_EQ(run({"export", at("far.organ"), "--out", at("far.stl")}), 2);
+  expect_line("far.organ lies so far from its file's origin");
+  EXPECT_EQ(run({"export", at("far.organ"), "--out", at("far.vtu")}), 0) << log();
 }
 
 TEST_F(OrganProgram, AGlbFileIsInMetres) {
@@ -254,6 +297,28 @@ TEST_F(OrganProgram, FitSaysWhenTheOrganCannotBeWritten) {
   EXPECT_EQ(fit(scenario_, curve_, {"--organ", file + "/x.organ"}), 5);
   EXPECT_NE(log().find("trocar-organ: " + file + "/x.organ: cannot be written"), std::string::npos)
       << log();
+}
+
+TEST_F(OrganProgram, NothingIsRunForAFileThatCannotBeWritten) {
+  EXPECT_EQ(fit(scenario_, curve_, {"--organ", at("none/x.organ")}), 5);
+  expect_line("none/x.organ: cannot be written, its folder is not there");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  EXPECT_EQ(run({"calibrate", "liver", "--results", at("out"), "--out", at("none/x.organ")}), 5);
+  expect_line("none/x.organ: cannot be written, its folder is not there");
+}
+
+TEST_F(OrganProgram, CalibrateRefusesWhatItCannotPress) {
+  EXPECT_EQ(run({"calibrate", "liver", "--radius", "0", "--results", at("out")}), 2);
+  expect_line("--radius must be 0.5 to 50 mm");
+  ASSERT_EQ(run({"export", "liver", "--unit", "mm", "--out", at("a.stl")}), 0) << log();
+  ASSERT_EQ(run({"import", at("a.stl"), "--unit", "mm", "--nodes", "500", "--fix", "none", "--out",
+                 at("free.organ")}),
+            0)
+      << log();
+  EXPECT_EQ(run({"calibrate", at("free.organ"), "--results", at("out"), "--out", at("x.organ")}),
+            3);
+  expect_line("nothing holds it, so a press moves all of it");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "x.organ"));
 }
 
 TEST_F(OrganProgram, SettleWritesAnOrganThatIsAtRestUnderItsGravity) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <string>
 #include <variant>
@@ -99,6 +100,80 @@ TEST(SurfaceReaders, SplitFacesOfMoreCorners) {
   EXPECT_EQ(raw->face_numbers, (std::vector<std::int64_t>{1, 1, 2}));
 }
 
+// A prism of 30 over an L of 60 x 60, whose arms are 20 wide.
+std::string prism_over_an_l() {
+  std::string text;
+  for (const char* z : {"0", "30"})
+    for (const char* xy : {"0 0", "60 0", "60 20", "20 20", "20 60", "0 60"})
+      text += std::string("v ") + xy + " " + z + "\n";
+  return text +
+         "f 6 5 4 3 2 1\nf 8 9 10 11 12 7\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\n"
+         "f 5 6 12 11\nf 6 1 7 12\n";
+}
+
+TEST(SurfaceReaders, CutConcaveFacesEarByEar) {
+  // A face may begin with any of its corners; around four of them triangles overlap.
+  for (const char* top : {"8 9 10 11 12 7", "9 10 11 12 7 8", "10 11 12 7 8 9", "11 12 7 8 9 10",
+                          "12 7 8 9 10 11", "7 8 9 10 11 12"}) {
+    auto raw = parse_obj(changed(prism_over_an_l(), "8 9 10 11 12 7", top), "a.obj");
+    ASSERT_TRUE(raw.ok()) << raw.error().message;
+    EXPECT_EQ(raw->triangles.size(), 4u + 4u + 6u * 2u);
+    const auto solid = surface::check_surface(std::move(*raw), mesh::Unit::Millimetre, "a");
+    ASSERT_TRUE(solid.ok()) << top << ": " << solid.error().message;
+    EXPECT_TRUE(solid->warnings.empty());
+    EXPECT_NEAR(solid->volume_m3, 60e-6, 1e-12);
+  }
+  const auto ply = parse_ply(
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 3 0\n-2 0 0\n0 1 0\n2 0 0\n4 3 0 1 2\n",
+      "a.ply");
+  ASSERT_TRUE(ply.ok()) << ply.error().message;
+  ASSERT_EQ(ply->triangles.size(), 2u);
+  for (const auto& t : ply->triangles)  // each has a half of the arrowhead
+    EXPECT_TRUE(std::ranges::count(t, NodeIndex(0)) == 1 &&
+                std::ranges::count(t, NodeIndex(2)) == 1);
+}
+
+// It has no right cut. A surface that must be closed is refused later.
+TEST(SurfaceReaders, CutAFaceThatCrossesItselfAroundItsFirstCorner) {
+  const auto raw = parse_obj("v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n", "a.obj");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  EXPECT_EQ(raw->triangles.size(), 2u);
+}
+
+TEST(SurfaceReaders, RefuseConcaveFacesOfManyCorners) {
+  const auto zigzag = [](int corners) {
+    std::string text = "v " + std::to_string(corners) + " 5000 0\nv 0 5000 0\n", face = "f 1 2";
+    for (int i = 3; i <= corners; ++i) {
+      text += "v " + std::to_string(i) + " " + std::to_string(i % 2 * 4000) + " 0\n";
+      face += " " + std::to_string(i);
+    }
+    return text + face + "\n";
+  };
+  const auto most = parse_obj(zigzag(128), "a.obj");
+  ASSERT_TRUE(most.ok()) << most.error().message;
+  EXPECT_EQ(most->triangles.size(), 126u);
+  EXPECT_EQ(error_of(zigzag(129), "a.obj"),
+            "a.obj:130: face 1 is concave and has 129 corners, may have 128: save it as "
+            "triangles");
+}
+
+TEST(ObjReader, CornersOfAConcaveFaceKeepTheirPlacesInAPicture) {
+  const auto raw = parse_obj(
+      "v 0 3 0\nv -2 0 0\nv 0 1 0\nv 2 0 0\nvt 0 3\nvt -2 0\nvt 0 1\nvt 2 0\n"
+      "f 4/4 1/1 2/2 3/3\n",
+      "a.obj");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  ASSERT_EQ(raw->triangles.size(), 2u);
+  ASSERT_EQ(raw->corner_texture.size(), 2u);
+  for (std::size_t t = 0; t < 2; ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3d& p = raw->positions[raw->triangles[t][k].value];
+      EXPECT_EQ(raw->corner_texture[t][k], (std::array{p.x, p.y}));
+    }
+}
+
 TEST(ObjReader, CornersHaveTheirPlacesInAPicture) {
   const std::string text =
       "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 0.5\n"
@@ -128,7 +203,7 @@ TEST(ObjReader, WrongPlacesInAPictureAreLeftOutAndSaid) {
   EXPECT_EQ(fault_of("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1/1 2/2 3/3\n"),
             "a.obj:4: refers to texture coordinate 1, the file has 0");
   EXPECT_EQ(fault_of(text + "f 1/1 2/-3 3/1\n"),
-            "a.obj:6: refers to texture coordinate 0, the file has 2");
+            "a.obj:6: face 1 refers to texture coordinate '-3', 2 come before it");
   EXPECT_EQ(fault_of(text + "f 1/1 2/0 3/x\n"),
             "a.obj:6: face 1 refers to texture coordinate '0', must be a whole number other than "
             "0");
@@ -144,6 +219,8 @@ TEST(SurfaceReaders, ErrorsSayWhereAndWhat) {
   };
   expect(changed(kObj, "f 1 2 4", "f 1 2 5"), "a.obj", "a.obj:9: face 2 refers to vertex 5");
   expect(changed(kObj, "f 1 2 4", "f 1 2 0"), "a.obj", "must be a whole number other than 0");
+  expect(changed(kObj, "f 1 2 4", "f 1 2 -9"), "a.obj",
+         "a.obj:9: face 2 refers to vertex '-9', 4 come before it");
   expect(changed(kObj, "f 1 2 4", "f 1 2"), "a.obj", "face 2 has 2 corners");
   expect(changed(kObj, "v 1 0 0", "v 1 0"), "a.obj", "a.obj:4: vertex 2: coordinate ''");
   expect(changed(kObj, "vn 0", "curv 0"), "a.obj", "'curv' is not known");

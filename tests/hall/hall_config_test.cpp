@@ -56,6 +56,8 @@ TEST(HallConfig, SaysWhereItIsWrong) {
   for (const auto& [text, expected] : {
            Case{"", "key key: is missing"},
            {"key = \"k\"\n", "recordings"},
+           {"sessions-listen = \"nowhere\"\n" + kLeast, "key sessions-listen: is no IPv4"},
+           {"listen = \"nowhere:7694\"\ntls = true\n" + kLeast, "key listen: is not ADDRESS:PORT"},
            {"key = \"k\"\nrecordings = \"r\"\n", "[[offer]]"},
            {"most-sesions = 3\n" + kLeast, "hall.toml:1: key most-sesions: is unknown"},
            {"most-sessions = 0\n" + kLeast, "allowed are 1 to 64"},

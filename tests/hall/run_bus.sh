@@ -86,6 +86,13 @@ chmod 600 other.key
 code=0
 "$bin/trocar-hall" start lattice --nats $url --key other.key 2>said || code=$?
 [ $code = 4 ] && grep -q 'the key is wrong' said || fail "another key: $code, $(cat said)"
+code=0
+"$bin/trocar-hall" list --nats $url --key other.key >listed 2>said || code=$?
+[ $code = 4 ] && grep -q '^one .*running' listed && [ "$(grep -o 'the key is wrong' said | wc -l)" = 2 ] ||
+  fail "a list with another key: $code, $(cat said)"
+code=0
+"$bin/trocar-hall" list --nats foo 2>said || code=$?
+[ $code = 2 ] && grep -q "'foo' is neither nats://" said || fail "a URL that is none: $code, $(cat said)"
 
 # NATS is killed: the sessions go on, and are found again by themselves.
 kill -KILL $nats

@@ -5,6 +5,8 @@
 #   room      a hall of one core takes what fits and names the numbers of what does not
 #   killed    a killed server goes on from its recording; a client comes back; the third time it fails
 #   found     a killed hall leaves its sessions running, and the next one finds them
+#   signals   a log that nobody reads any more and a closed terminal end nothing out of order
+#   full      a hall whose disk is full says so
 #   tls       the hall's port over TLS: who knows its certificate gets in, the key goes to no other
 #
 # Exit code 77: curl is missing, or a client that was not built.
@@ -36,6 +38,8 @@ case $test in
   killed) base=17730 ;;
   found) base=17740 ;;
   tls) base=17750 ;;
+  full) base=17700 ;;
+  signals) base=17760 ;;
   *) fail "$test: no such test" ;;
 esac
 
@@ -84,6 +88,26 @@ test_sessions() {
   configure 'cores = 100' "$lattice" '[[offer]]' 'name = "rings"' 'lesson = "move-the-rings"'
   "$bin/trocar-hall" --config hall.toml --check-config | grep -q fine || fail "the file is not fine"
   [ ! -e hall-state ] || fail "a check has made something"
+  # What a start would refuse.
+  : >file
+  mkdir -m 755 open
+  refuses() { # WORDS SED_COMMAND
+    sed "$2" hall.toml >bad.toml
+    code=0
+    "$bin/trocar-hall" --config bad.toml --check-config >said 2>&1 || code=$?
+    [ $code = 2 ] && grep -q -- "$1" said && [ "$(wc -l <said)" = 1 ] || fail "'$2': $code, $(cat said)"
+  }
+  refuses 'key key: .*file' 's|^key = .*|key = "file/x"|'
+  refuses 'key recordings: file' 's|^recordings = .*|recordings = "file"|'
+  refuses 'key state: file' 's|^state = .*|state = "file"|'
+  refuses 'chmod 700' 's|^state = .*|state = "open"|'
+  refuses 'key sessions-listen' '1i sessions-listen = "nowhere"'
+  mkdir -m 700 damaged
+  (umask 077; echo '{' >damaged/sessions.json)
+  refuses 'is damaged' 's|^state = .*|state = "damaged"|'
+  code=0
+  "$bin/trocar-hall" start --key file 2>said || code=$?
+  [ $code = 2 ] && grep -q 'LESSON is required' said || fail "a start of nothing: $code, $(cat said)"
   start_hall --log-format json
   [ "$(stat -c %a hall.key)" = 600 ] || fail "others may read the key"
   [ "$(curl -s "http://$at/healthz")" = ok ] || fail "it is not healthy"
@@ -116,6 +140,18 @@ test_sessions() {
   grep -q 'allows 3' answer || fail "$(cat answer)"
   wait_for 60 running list
   curl -s "http://$at/metrics" | grep -q '^trocar_hall_sessions{state="running"}' || fail "no figures"
+  # One that stands still is known by its silence.
+  first=$(pids | head -n 1)
+  kill -STOP "$first"
+  wait_for 30 'does not answer for' list
+  curl -s "http://$at/metrics" | grep -qE '^trocar_hall_session_silence_seconds.* ([5-9]|[1-9][0-9]+)' ||
+    fail "no figure of its silence"
+  kill -CONT "$first"
+  for _ in $(seq 50); do
+    list | grep -q 'does not answer for' || break
+    sleep 0.2
+  done
+  list | grep -q 'does not answer for' && fail "it is called silent although it answers again"
   # A second hall may not have the same state.
   code=0
   "$bin/trocar-hall" --config hall.toml >second.log 2>&1 || code=$?
@@ -242,8 +278,17 @@ test_found() {
   wait_for 60 '"state": "running"' curl -s "http://$at/sessions/one"
   wait_for 60 '"state": "running"' curl -s "http://$at/sessions/two"
   [ "$(field one restarts)" = 0 ] || fail "one was started again"
+  list | grep -qE '^[01]\.[0-9]* of 100.00 cores' || fail "the cores of the offers are forgotten: $(list)"
   [ "$(field two restarts)" = 1 ] || fail "two was not started again"
   pids | grep -qx "$(grep -vx "$killed" <<<"$before")" || fail "one is another process"
+  # State files of before do not say it: then the configuration does.
+  kill -KILL $hall
+  wait $hall || true
+  jq 'del(.sessions[].start.cores)' hall-state/sessions.json >earlier
+  cat earlier >hall-state/sessions.json
+  start_hall
+  wait_for 60 '"state": "running"' curl -s "http://$at/sessions/one"
+  list | grep -qE '^[01]\.[0-9]* of 100.00 cores' || fail "the configuration's cores are not used: $(list)"
   list | grep -q "$(sed -n 's/^ *surgeon *\([^ ]*\) .*/\1/p' one)" || fail "its codes are not known"
   "$bin/trocar-hall" end one --at "$at" --key hall.key >ended || fail "no end"
   "$bin/trocar-journal" verify recordings/*-one/session.mcap >verified || fail "$(cat verified)"
@@ -251,6 +296,77 @@ test_found() {
   wait $hall || fail "the hall ended with $?"
   hall=
   "$bin/trocar-journal" verify recordings/*-two/session-2.mcap >verified || fail "$(cat verified)"
+}
+
+wait_for_file() { # FILE
+  for _ in $(seq 200); do
+    [ -s "$1" ] && return
+    sleep 0.05
+  done
+  fail "$1 does not come"
+}
+
+test_signals() {
+  configure 'cores = 100' "$lattice"
+  env --default-signal=HUP "$bin/trocar-hall" --config hall.toml --ready-file ready 2> >(head -n 1 >first.log) &
+  hall=$!
+  wait_for_file first.log
+  wait_for_file ready
+  at=127.0.0.1:$(cat ready)
+  "$bin/trocar-hall" start lattice --name one --at "$at" --key hall.key >started || fail "no start"
+  "$bin/trocar-hall" start lattice --name two --at "$at" --key hall.key >started || fail "no start"
+  kill -HUP $hall
+  kill -HUP $hall 2>/dev/null || true
+  wait $hall || fail "the hall ended with $?"
+  hall=
+  for recording in recordings/*/session.mcap; do
+    "$bin/trocar-journal" verify "$recording" >verified || fail "$(cat verified)"
+  done
+  # The same of a server, which leaves no link file with codes behind.
+  env --default-signal=HUP "$bin/trocar-server" --organ lattice --listen 127.0.0.1:0 --no-announce \
+    --journal pipe.mcap --summary pipe.json --ready-file server.port > >(head -n 1 >server.first) 2>&1 &
+  local server=$!
+  children+=($server)
+  wait_for_file server.first
+  wait_for_file server.port
+  sleep 1
+  kill -HUP $server
+  wait $server || fail "the server ended with $?"
+  [ -s pipe.json ] || fail "no summary"
+  [ -z "$(ls "$XDG_RUNTIME_DIR/trocar")" ] || fail "codes stay: $(ls "$XDG_RUNTIME_DIR/trocar")"
+  "$bin/trocar-journal" verify pipe.mcap >verified || fail "$(cat verified)"
+  # Under nohup a program outlives its terminal.
+  rm -f ready
+  nohup "$bin/trocar-hall" --config hall.toml --ready-file ready 2>>hall.log >/dev/null &
+  hall=$!
+  wait_for_file ready
+  kill -HUP $hall
+  sleep 1
+  kill -TERM $hall 2>/dev/null || fail "it has ended, though SIGHUP is ignored"
+  wait $hall || fail "the hall ended with $?"
+  hall=
+}
+
+test_full() {
+  unshare -rm true 2>/dev/null || { echo "hall: SKIPPED: no file system can be mounted here"; exit 77; }
+  configure 'cores = 100' "$lattice"
+  mkdir recordings
+  # The small disk is seen by the hall alone.
+  unshare -rm bash -c 'mount -t tmpfs -o size=64k small recordings && { cat /dev/zero >recordings/all 2>/dev/null || true; } &&
+    exec "$0" --config hall.toml --ready-file ready' "$bin/trocar-hall" 2>>hall.log &
+  hall=$!
+  for _ in $(seq 200); do
+    [ -s ready ] && break
+    kill -0 $hall 2>/dev/null || fail "the hall does not start"
+    sleep 0.05
+  done
+  at=127.0.0.1:$(cat ready)
+  code=0
+  "$bin/trocar-hall" start lattice --at "$at" --key hall.key >said 2>&1 || code=$?
+  [ $code = 4 ] && grep -q 'recordings/.*cannot be written (No space left' said || fail "$code, $(cat said)"
+  kill -TERM $hall
+  wait $hall || fail "the hall ended with $?"
+  hall=
 }
 
 # An authority that the machine trusts, and a program with its certificate that writes down what it is sent.
@@ -313,8 +429,11 @@ test_tls() {
   hall=
   configure 'tls = true' 'certificate = "missing.crt"' 'certificate-key = "missing.key"' "$lattice"
   refused 2 'missing.crt' --config hall.toml --check-config
-  configure 'tls = true' 'certificate = "before.crt"' 'certificate-key = "hall-state/tls/hall.key"' "$lattice"
+  cp hall-state/tls/hall.key before.key
+  chmod 644 before.key
+  configure 'tls = true' 'certificate = "before.crt"' 'certificate-key = "before.key"' "$lattice"
   start_hall
+  grep -q 'before.key: others on this machine can read this key' hall.log || fail "no word of an open key"
   ask list --at "https://$at" --certificate before.crt >said || fail "$(cat said)"
 }
 

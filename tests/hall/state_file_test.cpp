@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <string>
 
 namespace trocar::hall {
@@ -14,12 +15,8 @@ namespace fs = std::filesystem;
 HallState some_state() {
   SavedSession session;
   session.name = "liver-1";
-  session.offer = {.name = "liver",
-                   .lesson = "",
-                   .organ = "liver",
-                   .cores = std::nullopt,
-                   .workers = 2,
-                   .bleeds = true};
+  session.offer = {
+      .name = "liver", .lesson = "", .organ = "liver", .cores = 0.4, .workers = 2, .bleeds = true};
   session.folder = "/tmp/recordings/liver-1";
   session.port = 7710;
   session.figures_port = 7730;
@@ -41,6 +38,17 @@ TEST(StateFile, IsReadAsItWasWritten) {
   EXPECT_EQ(to_text(*read), text);
   EXPECT_EQ(read->sessions.at(0).process.started_at, 987654321u);
   EXPECT_EQ(read->measured_cores.at("liver"), 0.5);
+  EXPECT_EQ(read->sessions.at(0).offer.cores, 0.4) << "a restarted hall counts it as before";
+}
+
+TEST(StateFile, MaySayNothingOfCores) {
+  auto state = some_state();
+  state.sessions.at(0).offer.cores.reset();
+  const auto text = to_text(state);
+  EXPECT_EQ(text.find("\"cores\""), std::string::npos);
+  const auto read = parse_state(text, "file");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_FALSE(read->sessions.at(0).offer.cores);
 }
 
 TEST(StateFile, DamageIsOneLineThatSaysWhatToDo) {
@@ -53,6 +61,7 @@ TEST(StateFile, DamageIsOneLineThatSaysWhatToDo) {
   for (const auto& [from, to] : {std::pair{"\"port\": 7710", "\"port\": 77100"},
                                  {"\"version\": 1", "\"version\": 2"},
                                  {"\"pid\": 1234", "\"pid\": 1e99"},
+                                 {"\"cores\": 0.4", "\"cores\": -1"},
                                  {"\"name\": \"liver-1\"", "\"name\": \"../1\""}}) {
     auto other = text;
     const auto at = other.find(from);
@@ -60,6 +69,30 @@ TEST(StateFile, DamageIsOneLineThatSaysWhatToDo) {
     other.replace(at, std::string(from).size(), to);
     EXPECT_FALSE(parse_state(other, "file")) << to;
   }
+}
+
+TEST(StateFile, IsCheckedWithoutAnythingMade) {
+  const auto folder = fs::temp_directory_path() / ("trocar-check-" + std::to_string(::getpid()));
+  EXPECT_TRUE(StateFile::check(folder));
+  EXPECT_FALSE(fs::exists(folder));
+  {
+    const auto file = StateFile::open(folder);
+    ASSERT_TRUE(file) << file.error().message;
+    ASSERT_TRUE(file->write(some_state()));
+    EXPECT_TRUE(StateFile::check(folder)) << "a hall that runs is in nobody's way";
+  }
+  fs::permissions(folder, fs::perms::others_read, fs::perm_options::add);
+  EXPECT_FALSE(StateFile::check(folder)) << "others may look into it";
+  fs::permissions(folder, fs::perms::owner_all);
+  std::ofstream(folder / "sessions.json") << "{";
+  const auto damaged = StateFile::check(folder);
+  ASSERT_FALSE(damaged);
+  EXPECT_NE(damaged.error().message.find("is damaged"), std::string::npos);
+  const auto file = StateFile::open(folder / "sessions.json");
+  ASSERT_FALSE(file) << "it is no folder";
+  EXPECT_EQ(file.error().message.find("--state"), std::string::npos) << "a hall has no such option";
+  EXPECT_FALSE(StateFile::check(folder / "sessions.json"));
+  fs::remove_all(folder);
 }
 
 TEST(StateFile, BelongsToOneHallAndToNobodyElse) {

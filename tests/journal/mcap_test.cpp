@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
+#include <filesystem>
 
 #include "common/base/checksum.h"
+#include "common/base/unfinished_file.h"
 #include "tests/journal/mcap_files.h"
 
 namespace trocar::journal {
@@ -331,8 +334,32 @@ TEST(mcap, never_overwrites_a_recording) {
   save_file(path, Bytes{1, 2, 3});
   const auto writer = McapWriter::create(path, {});
   ASSERT_FALSE(writer.ok());
+  EXPECT_EQ(writer.error().code, ErrorCode::BadFile);
   EXPECT_NE(writer.error().message.find("exists already"), std::string::npos);
   EXPECT_EQ(load_file(path), (Bytes{1, 2, 3}));
+}
+
+TEST(mcap, a_signal_leaves_no_half_of_a_file) {
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.mcap"), part = UnfinishedFile::name_for(path);
+  const auto write_until = [&](int number) {
+    remove_unfinished_files_on_signals();
+    const auto writer = create(part);
+    const UnfinishedFile file(part);
+    raise(number);
+  };
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) {
+    EXPECT_EXIT(write_until(number), ::testing::KilledBySignal(number), "");
+    EXPECT_TRUE(std::filesystem::is_empty(folder.file("")));
+  }
+  // A file that has its name stays.
+  {
+    ASSERT_TRUE(create(part)->close().ok());
+    UnfinishedFile file(part);
+    ASSERT_TRUE(file.rename_to_new(path).ok());
+  }
+  EXPECT_TRUE(std::filesystem::exists(path));
+  EXPECT_FALSE(std::filesystem::exists(part));
 }
 
 TEST(mcap, full_disk_is_an_error_and_stays_one) {

@@ -265,6 +265,23 @@ TEST_F(session_journal, repair_leaves_damaged_chunks_out_and_whole_recordings_al
   EXPECT_EQ((*after)->container().chunks().size(), chunks.size() - 1);
 }
 
+TEST_F(session_journal, repair_refuses_what_ends_before_its_organ_does) {
+  {
+    SampleSession session(path_);
+    session.run(250);
+  }
+  const auto chunks = open_journal()->container().chunks();
+  const auto bytes = load_file(path_);
+  // The organ is the first message, in a chunk of its own.
+  save_file(path_, BytesView(bytes).first(chunks[0].chunk_offset + chunks[0].chunk_length - 1));
+  const auto repaired_path = folder_.file("repaired.mcap");
+  const auto report = repair(path_, repaired_path);
+  ASSERT_FALSE(report.ok());
+  EXPECT_EQ(report.error().code, ErrorCode::BadFile);
+  EXPECT_NE(report.error().message.find("no organ"), std::string::npos) << report.error().message;
+  EXPECT_FALSE(std::filesystem::exists(repaired_path));
+}
+
 TEST_F(session_journal, damage_is_an_error_after_everything_else_was_read) {
   SampleSession session(path_);
   session.run(250);

@@ -95,6 +95,24 @@ TEST(NiftiReader, ReadsGzipAndOtherTypes) {
   EXPECT_NE(error_of(floats).find("voxel (2, 1, 0) is no label"), std::string::npos);
 }
 
+// A file of 16 bits has 300 voxels with so many values beside 0.
+std::string of_values(int values) {
+  auto file = nifti({10, 10, 3}, 2, [](int, int, int) { return 0; }).substr(0, 352);
+  put(file, 70, std::int16_t{4});
+  for (int i = 0; i < 300; ++i) {
+    const auto value = static_cast<std::int16_t>(10 * (i % (values + 1)));
+    file.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  return file;
+}
+
+TEST(NiftiReader, AScanOfGreyValuesIsRefused) {
+  EXPECT_TRUE(parse(of_values(256)).ok()) << error_of(of_values(256));
+  EXPECT_EQ(error_of(of_values(257)),
+            "a.nii: has more than 256 values: it holds grey values, not labels, so segment it "
+            "first, in 3D Slicer for instance");
+}
+
 TEST(NiftiReader, ErrorsNameTheField) {
   const auto expect = [](std::size_t offset, auto value, const char* part) {
     auto file = small();
@@ -109,7 +127,8 @@ TEST(NiftiReader, ErrorsNameTheField) {
   expect(40, std::int16_t{2}, "dim[0] is 2");
   expect(42, std::int16_t{-3}, "dim[1] is -3");
   expect(46, std::int16_t{32767}, "voxels, 60 follow: it is cut off");
-  expect(70, std::int16_t{128}, "datatype 128 holds no labels");
+  expect(70, std::int16_t{128}, "datatype 128 is not read: save it as one of uint8, int16, int32");
+  expect(70, std::int16_t{1280}, "datatype 1280 is not read");
   expect(108, 1e9f, "vox_offset must be");
   expect(112, 2.0f, "scl_slope and scl_inter");
   expect(123, char{5}, "xyzt_units 5");

@@ -139,6 +139,19 @@ TEST_F(ServerConfig, FaultsNameFileLineKeyAndLimit) {
   expect_fault("[&", ": ", "is not TOML");
 }
 
+TEST_F(ServerConfig, ASummaryThatCouldNotBeWrittenIsFoundAtTheStart) {
+  EXPECT_EQ(run({"--organ", "lattice", "--listen", "127.0.0.1:0", "--journal", "none", "--state",
+                 at("state"), "--seconds", "0.1", "--summary", at("none/s.json")}),
+            5);
+  expect_line("none/s.json: cannot be written, its folder is not there");
+  const auto kept = write("kept.mcap", "\x89MCAP0\r\n");
+  EXPECT_EQ(run({"--organ", "lattice", "--listen", "127.0.0.1:0", "--journal", "none", "--state",
+                 at("state"), "--seconds", "0.1", "--summary", kept}),
+            2);
+  expect_line("--summary: " + kept + " is a recording, which would be lost");
+  EXPECT_FALSE(std::filesystem::exists(at("state")));
+}
+
 TEST_F(ServerConfig, FaultsOfFilesAndCombinationsAreFound) {
   const std::string lattice = "organ = 'lattice'\n";
   expect_fault("organ = '/no/such.organ'\n", ":1: key organ: ", "/no/such.organ");
@@ -154,7 +167,7 @@ TEST_F(ServerConfig, FaultsOfFilesAndCombinationsAreFound) {
   expect_fault(lattice + "journal = '" + write("old.mcap", "") + "'\n",
                ":2: key journal: ", "exists already");
   expect_fault(lattice + "summary = '/no/folder/summary.json'\n",
-               ":2: key summary: ", "/no/folder is no folder");
+               ":2: key summary: ", "its folder is not there");
   expect_fault(lattice + "audit = '/no/folder/audit.jsonl'\n", ":2: key audit: ", "/no/folder");
   expect_fault(lattice + "revoke = 'observer'\n", ":2: key revoke: ", "no session");
   EXPECT_EQ(check(lattice, {"--organ", "/no/such.organ"}), 2);

@@ -3,9 +3,13 @@
 #include "server/organs/embed/embed.h"
 
 #include <gtest/gtest.h>
+#include <turbojpeg.h>
 
+#include <memory>
 #include <utility>
+#include <vector>
 
+#include "common/image/image.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/organ_file.h"
 
@@ -29,13 +33,33 @@ EmbedOptions options_of(const Vec3d& offset_m) {
           .axes = surface::Axes::Unsaid,
           .offset_m = offset_m,
           .picture = {},
+          .picture_name = "pic.png",
           .name = "fine.obj"};
 }
 
-std::string png_header(unsigned width, unsigned height) {
-  std::string file("\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR", 16);
-  for (const unsigned side : {width, height})
-    for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(side >> shift);
+std::vector<std::uint8_t> colours(int width, int height) {
+  std::vector<std::uint8_t> rgb;
+  for (int i = 0; i < 3 * width * height; ++i)
+    rgb.push_back(static_cast<std::uint8_t>(i % 251 * (i % 7)));
+  return rgb;
+}
+
+std::string png(int width, int height) {
+  auto file = image::encode_png(width, height, colours(width, height));
+  EXPECT_TRUE(file.ok());
+  return file.ok() ? *file : std::string();
+}
+
+std::string jpeg(int width, int height) {
+  const std::unique_ptr<void, int (*)(tjhandle)> writer(tjInitCompress(), tjDestroy);
+  const auto rgb = colours(width, height);
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  EXPECT_EQ(tjCompress2(writer.get(), rgb.data(), width, 0, height, TJPF_RGB, &bytes, &size,
+                        TJSAMP_420, 90, TJFLAG_PROGRESSIVE),
+            0);
+  std::string file(reinterpret_cast<const char*>(bytes), size);
+  tjFree(bytes);
   return file;
 }
 
@@ -145,7 +169,7 @@ TEST_F(Embed, AFewVerticesMayBeFartherAwayAndAreTold) {
 TEST_F(Embed, TheOrgansFileKeepsItAndItsHashDoesNotKnowIt) {
   const auto hash = organ::organ_hash(organ_);
   auto options = options_of(offset_);
-  options.picture = png_header(2048, 2048);
+  options.picture = png(60, 40);
   organ_.fine_surface = embed(raw_of(organ_.mesh, offset_), organ_.mesh, options)->surface;
   EXPECT_EQ(organ::organ_hash(organ_), hash);
   const auto read_back = organ::unpack_organ(organ::pack_organ(organ_));
@@ -182,19 +206,45 @@ TEST_F(Embed, PicturesThatNoClientWouldShowAreRefused) {
     const auto fine = embed(raw, organ_.mesh, options);
     return fine.ok() ? std::string() : fine.error().message;
   };
-  const std::string jpeg_start("\xff\xd8\xff\xe0\0\4ab\xff", 9);
-  const auto jpeg = [&](const char* size) {
-    return jpeg_start + std::string("\xff\xc2\0\x0b\x08", 5) + std::string(size, 4) + "rest";
-  };
-  EXPECT_EQ(error(png_header(2048, 1)), "");
-  EXPECT_EQ(error(jpeg("\x08\0\0\x20")), "");
-  EXPECT_EQ(error(png_header(2049, 1)),
-            "fine.obj: the picture has 2049 x 1 pixels, may have 1 to 2048 along a side");
-  EXPECT_EQ(error(jpeg("\x08\1\0\x20")),
-            "fine.obj: the picture has 32 x 2049 pixels, may have 1 to 2048 along a side");
-  EXPECT_EQ(error(png_header(0, 1)),
-            "fine.obj: the picture has 0 x 1 pixels, may have 1 to 2048 along a side");
+  EXPECT_EQ(error(png(2048, 1)), "");
+  EXPECT_EQ(error(jpeg(32, 2048)), "");
+  EXPECT_EQ(error(png(2049, 1)), "pic.png: has 2049 x 1 pixels, may have 1 to 2048 along a side");
+  EXPECT_EQ(error(jpeg(32, 2049)),
+            "pic.png: has 32 x 2049 pixels, may have 1 to 2048 along a side");
+  const std::string no_width("\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR\0\0\0\0\0\0\0\1", 24);
+  EXPECT_EQ(error(no_width), "pic.png: has 0 x 1 pixels, may have 1 to 2048 along a side");
   EXPECT_NE(error("\xff\xd8\xff and no more").find("its header is broken"), std::string::npos);
+  EXPECT_EQ(error(png(1, 1) + std::string(4 << 20, ' ')).find("pic.png: has 41"), 0u);
+}
+
+// Each client would unpack it, fail and draw the surface without it.
+TEST_F(Embed, DamagedPicturesAreRefused) {
+  auto options = options_of(offset_);
+  const auto raw = raw_of(organ_.mesh, offset_);
+  for (const auto& whole : {png(60, 40), jpeg(60, 40)}) {
+    options.picture = whole;
+    EXPECT_TRUE(embed(raw, organ_.mesh, options).ok());
+    options.picture = whole.substr(0, whole.size() / 2);
+    const auto fine = embed(raw, organ_.mesh, options);
+    ASSERT_FALSE(fine.ok());
+    EXPECT_EQ(fine.error().message.find("pic.png: cannot be unpacked (picture: "), 0u)
+        << fine.error().message;
+    EXPECT_EQ(fine.error().message.find('\n'), std::string::npos);
+  }
+  options.picture_name.clear();  // as that of a .glb file
+  EXPECT_EQ(
+      embed(raw, organ_.mesh, options).error().message.find("fine.obj: its picture cannot be "),
+      0u);
+}
+
+TEST_F(Embed, APictureNeedsTextureCoordinates) {
+  auto options = options_of(offset_);
+  options.picture = png(8, 8);
+  auto raw = raw_of(organ_.mesh, offset_);
+  raw.corner_texture.clear();
+  const auto fine = embed(raw, organ_.mesh, options);
+  ASSERT_FALSE(fine.ok());
+  EXPECT_EQ(fine.error().message, "fine.obj: has no texture coordinates for the picture pic.png");
 }
 
 TEST_F(Embed, WrongPlacesInAPictureAreRefused) {

@@ -62,6 +62,27 @@ TEST(Labels, MoreThanAnOrganMayHaveAreRefusedBeforeTheyAreMeshed) {
             (Names{"map.dcm: has 8000 labels, an organ may have 1000: choose some (--labels)"}));
 }
 
+TEST(Labels, OfOneNumberOrNameAreRefused) {
+  EXPECT_EQ(regions_of("4:a,7:a"),
+            (Names{"--labels: 4 and 7 are both named 'a': say another name, such as 7:NAME"}));
+  EXPECT_EQ(regions_of("4:Left kidney,7"), (Names{"--labels: 4 and 7 are both named 'Left kidney': "
+                                                  "say another name, such as 7:NAME"}));
+  EXPECT_EQ(regions_of("4:a,4:b"), (Names{"--labels: label 4 is there twice: say it once"}));
+  EXPECT_EQ(regions_of("4,Liver"), (Names{"--labels: label 4 is there twice: say it once"}));
+  EXPECT_EQ(regions_of("4:,7"), (Names{"--labels: '4:' has no name behind its colon: say one, or "
+                                       "the number alone"}));
+}
+
+TEST(Labels, ThatTheMapNamesAlikeGetDistinctNames) {
+  auto map = two_halves();
+  map.names = {{4, "Lobe"}, {7, "Lobe"}};
+  EXPECT_EQ(regions_of("", map), (Names{"Lobe", "Lobe-2"}));
+  EXPECT_EQ(regions_of("4,7:other", map), (Names{"Lobe", "other"}));
+  EXPECT_EQ(regions_of("Lobe", map),
+            (Names{"--labels: map.dcm has more than one label 'Lobe': choose by number, such as "
+                   "4:NAME"}));
+}
+
 TEST(Labels, WhatTheMapDoesNotHaveIsRefusedWithWhatItHas) {
   EXPECT_EQ(regions_of("Tumour"),
             (Names{"--labels: map.dcm has no label 'Tumour', it has 4:Liver, 7:Left kidney"}));

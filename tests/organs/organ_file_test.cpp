@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <functional>
 
 #include "common/base/checksum.h"
@@ -14,6 +15,7 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/packed_file.h"
+#include "tests/support/files.h"
 #include "tests/support/shared.h"
 
 namespace trocar::organ {
@@ -361,6 +363,30 @@ TEST(LoadOrgan, ImportsAMesh) {
   ASSERT_TRUE(imported.ok());
   EXPECT_EQ(imported->organ.name, "other_");
   EXPECT_TRUE(imported->organ.fixed_nodes.empty());
+}
+
+// Without names, groups of lines and of triangles have the same numbers.
+TEST(LoadOrgan, SetsAndRegionsOfOneNameGetDistinctNames) {
+  const trocar::testing::TemporaryFolder folder;
+  const auto path = folder.file("two.msh");
+  std::ofstream(path) << "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+                         "$PhysicalNames\n2\n3 1 \"part\"\n3 2 \"part\"\n$EndPhysicalNames\n"
+                         "$Nodes\n5\n1 0 0 0\n2 0.1 0 0\n3 0 0.1 0\n4 0 0 0.1\n5 0 0 -0.1\n"
+                         "$EndNodes\n$Elements\n4\n1 1 2 1 1 1 2\n2 2 2 1 1 2 3 4\n"
+                         "3 4 2 1 1 1 2 3 4\n4 4 2 2 1 1 3 2 5\n$EndElements\n";
+  catalogue::ImportOptions options;
+  options.fix_set = "1-2";
+  const auto imported = catalogue::import_organ(path, options);
+  ASSERT_TRUE(imported.ok()) << imported.error().message;
+  EXPECT_EQ(imported->organ.fixed_nodes.size(), 3u);  // the triangle's
+  ASSERT_EQ(imported->organ.regions.size(), 2u);
+  EXPECT_EQ(imported->organ.regions[0].name, "part");
+  EXPECT_EQ(imported->organ.regions[1].name, "part-2");
+  EXPECT_EQ(imported->warnings, (std::vector<std::string>{
+                                    "regions share a name, so the next 'part' is 'part-2' here",
+                                    "sets of nodes share a name, so the next '1' is '1-2' here"}));
+  options.fix_set = "1";
+  EXPECT_EQ(catalogue::import_organ(path, options)->organ.fixed_nodes.size(), 2u);
 }
 
 }  // namespace

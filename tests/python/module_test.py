@@ -40,6 +40,9 @@ class ScenarioTest(unittest.TestCase):
                 self.assertEqual(recording.organ().hash, result.organ.hash)
             for call in (recording.events, recording.tools, lambda: recording.last_tick):
                 self.assertRaisesRegex(ValueError, "closed", call)
+            cut = pathlib.Path(folder) / "cut.mcap"  # before the organ's end
+            cut.write_bytes(path.read_bytes()[:1000])
+            self.assertRaisesRegex(trocar.Error, "no organ; the recording ended too early", trocar.Recording, cut)
         self.assertEqual(result.values["middle_displacement"].shape, (75, 3))
 
     def test_tools_of_a_recording_are_columns(self):

@@ -4,6 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <iterator>
+
 #include "common/journal/session_journal_writer.h"
 #include "server/session/recording/verify.h"
 #include "tests/recording/recorded_simulation.h"
@@ -106,6 +112,9 @@ TEST(anonymise, it_overwrites_nothing) {
   const auto before = trocar::testing::load_file(path);
   const auto report = anonymise(path, path, false);
   ASSERT_FALSE(report.ok());
+  EXPECT_EQ(report.error().code, ErrorCode::BadFile) << "as trim and merge";
+  EXPECT_TRUE(report.error().message.starts_with(path + ": exists already"))
+      << report.error().message;
   EXPECT_EQ(trocar::testing::load_file(path), before);
   auto bytes = before;
   bytes.resize(bytes.size() - 20);
@@ -114,6 +123,25 @@ TEST(anonymise, it_overwrites_nothing) {
   ASSERT_FALSE(cut.ok());
   EXPECT_NE(cut.error().message.find("is cut short or damaged"), std::string::npos);
   EXPECT_FALSE(anonymise(folder.file("none.mcap"), folder.file("b.mcap"), false).ok());
+}
+
+// A limit of this process stands for a disk without room, for the first byte and for later ones.
+TEST(anonymise, a_disk_without_room_is_left_as_it_was) {
+  const TemporaryFolder folder;
+  const auto path = talk(folder.file("a.mcap"));
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  for (const rlim_t bytes : {rlim_t{0}, rlim_t{100}}) {
+    const rlimit small{.rlim_cur = bytes, .rlim_max = before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const auto report = anonymise(path, folder.file("b.mcap"), false);
+    setrlimit(RLIMIT_FSIZE, &before);
+    ASSERT_FALSE(report.ok());
+    EXPECT_EQ(report.error().code, ErrorCode::ResourceMissing);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.file("")), {}), 1);
+  }
+  std::signal(SIGXFSZ, handler);
 }
 
 }  // namespace

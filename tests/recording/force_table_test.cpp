@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <sstream>
@@ -136,6 +137,58 @@ TEST_F(ForceTable, SaysWhatIsWrong) {
   EXPECT_EQ(run({"export", at("none.mcap"), "--forces", at("forces.csv")}), 3);
   EXPECT_EQ(run({"export", recording(), "--forces", at("no/such/folder.csv")}), 5);
   EXPECT_NE(log().find("--forces"), std::string::npos) << log();
+  EXPECT_NE(log().find("No such file or directory"), std::string::npos) << log();
+}
+
+TEST_F(ForceTable, NoOutputTakesThePlaceOfARecordingOrOfTheOtherOne) {
+  const auto whole = read(recording());
+  const auto file = at("a.mcap");
+  std::filesystem::copy_file(recording(), file);
+  for (const char* option : {"--forces", "--lesson"}) {
+    EXPECT_EQ(run({"export", file, option, file}), 2);
+    expect_line(option);
+    expect_line("is a recording, which would be lost");
+  }
+  EXPECT_EQ(read(file), whole);
+  EXPECT_EQ(run({"export", file, "--forces", at("t.csv"), "--lesson", at("./t.csv")}), 2);
+  expect_line("cannot hold both");
+  EXPECT_FALSE(std::filesystem::exists(at("t.csv")));
+}
+
+TEST_F(ForceTable, AFullDiskIsNamedAsSuch) {
+  EXPECT_EQ(run({"export", recording(), "--forces", "/dev/full"}), 5);
+  expect_line("No space left on device");
+  EXPECT_EQ(run({"export", recording(), "--forces", at("")}), 5);
+  expect_line("Is a directory");
+}
+
+TEST_F(ForceTable, ALinkStaysOne) {
+  write("target.csv", "old");
+  std::filesystem::create_symlink(at("target.csv"), at("link.csv"));
+  ASSERT_EQ(run({"export", recording(), "--forces", at("link.csv")}), 0) << log();
+  EXPECT_TRUE(std::filesystem::is_symlink(at("link.csv")));
+  EXPECT_TRUE(read(at("target.csv")).starts_with("time_s,"));
+}
+
+TEST_F(ForceTable, OutputThatNobodyGetsIsNoSuccess) {
+  const std::string program = TROCAR_BINARY_DIR "/trocar-journal";
+  for (const char* command : {"info", "info --json", "verify --json"}) {
+    const auto line = program + " " + command + " " + recording();
+    const int code = std::system((line + " >/dev/full 2>" + at("said")).c_str());
+    EXPECT_EQ(WEXITSTATUS(code), 5) << command;
+    const auto said = read(at("said"));
+    EXPECT_NE(said.find("standard output cannot be written"), std::string::npos) << said;
+    EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
+    EXPECT_EQ(WEXITSTATUS(std::system((line + " >/dev/null").c_str())), 0) << command;
+  }
+}
+
+TEST_F(ForceTable, AnOutputThatExistsIsOneCodeForAllCommands) {
+  write("b.mcap", "mine");
+  EXPECT_EQ(run({"anonymise", recording(), at("b.mcap")}), 3);
+  EXPECT_EQ(run({"trim", recording(), at("b.mcap"), "--from", "0", "--to", "1"}), 3);
+  expect_line("b.mcap: exists already");
+  EXPECT_EQ(read(at("b.mcap")), "mine");
 }
 
 // ---- one hand's moments ----

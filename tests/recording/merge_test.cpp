@@ -290,6 +290,7 @@ TEST_F(Merge, AFileThatIsMadeMeanwhileStays) {
   trocar::testing::save_file(to_, bytes_of(std::string_view("another")));
   const auto finished = (*copy)->finish({"test", {}});
   ASSERT_FALSE(finished.ok());
+  EXPECT_EQ(finished.error().code, ErrorCode::BadFile);
   EXPECT_NE(finished.error().message.find("exists already"), std::string::npos);
   EXPECT_EQ(fs::file_size(to_), 7u);
 }

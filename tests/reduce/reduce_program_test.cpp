@@ -53,10 +53,7 @@ TEST_F(ReduceProgram, LeavesAReducedModelAndHowFarItIsOff) {
 TEST_F(ReduceProgram, SaysEachMistakeInOneLine) {
   const auto says = [&](std::vector<std::string> arguments, int code, const char* what) {
     arguments.insert(arguments.begin(), "reduce");
-    for (const char* more : {"--results", "--out"}) {
-      arguments.push_back(more);
-      arguments.push_back(at("nothing"));
-    }
+    arguments.insert(arguments.end(), {"--results", at("results"), "--out", at("nothing")});
     EXPECT_EQ(run(arguments), code) << what;
     expect_line(what);
   };

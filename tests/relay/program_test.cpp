@@ -185,6 +185,17 @@ TEST_F(RelayPrograms, a_code_of_another_role_is_a_refusal) {
   EXPECT_NE(read_text(log).find("give it the observer's"), std::string::npos) << read_text(log);
 }
 
+TEST_F(RelayPrograms, says_for_how_long_it_tries_where_no_server_is_and_ends_in_order_on_sighup) {
+  const auto before = std::signal(SIGHUP, SIG_DFL);  // as in a terminal
+  Program relay("trocar-relay", {"--to", "127.0.0.1:1", "--code", "0000-0000-0000-0000"},
+                session_.folder / "Nobody.log");
+  ASSERT_TRUE(says("Nobody", "no server at 127.0.0.1:1 yet"));
+  ASSERT_TRUE(says("Nobody", "trying for 15 s"));
+  relay.signal(SIGHUP);
+  EXPECT_EQ(relay.wait(10), 0) << "a closed terminal";
+  std::signal(SIGHUP, before);
+}
+
 TEST_F(RelayPrograms, a_wrong_code_is_a_refusal) {
   Program relay("trocar-relay", {"--to", session_.address(), "--code", "0000-0000-0000-0000"},
                 session_.folder / "wrong.log");

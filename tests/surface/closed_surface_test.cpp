@@ -85,6 +85,11 @@ TEST(ClosedSurface, RefusesAndNamesThePlace) {
   RawSurface wide;
   add_box(wide, {}, 100);
   expect_error(wide, "is 100 m wide, larger than 2 m: if the file is in millimetres");
+  RawSurface centimetres, either;
+  add_box(centimetres, {}, 12);
+  expect_error(centimetres, "is 12 m wide, larger than 2 m: if the file is in centimetres");
+  add_box(either, {}, 30);
+  expect_error(either, "is 30 m wide, larger than 2 m: if the file is in millimetres or cent");
   RawSurface flat = box();
   for (Vec3d& p : flat.positions) p.z = 3;
   expect_error(flat, "");

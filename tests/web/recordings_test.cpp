@@ -41,6 +41,16 @@ TEST_F(RecordingsTest, ListsRecordingsAlone) {
   EXPECT_EQ(list[0]["bytes"], 10);
 }
 
+TEST_F(RecordingsTest, NamesWhatIsLeftOut) {
+  const auto recordings = Recordings::open(folder_);
+  ASSERT_TRUE(recordings.ok());
+  EXPECT_TRUE(recordings->left_out().empty());
+  write(folder_ / "b c.mcap", "");
+  write(folder_ / "\u00dcbung.mcap", "");
+  EXPECT_EQ(recordings->left_out(), (std::vector<std::string>{"b c.mcap", "\u00dcbung.mcap"}));
+  EXPECT_EQ(Json::parse(recordings->list()).size(), 1u);
+}
+
 TEST_F(RecordingsTest, ReadsParts) {
   const auto recordings = Recordings::open(folder_);
   ASSERT_TRUE(recordings.ok());

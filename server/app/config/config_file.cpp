@@ -100,6 +100,17 @@ Result<std::vector<CLI::ConfigItem>> ConfigReader::read(const std::string& text,
 
 }  // namespace
 
+void add_config_options(CLI::App& app, bool& checks_config, const std::string& checks) {
+  auto* config = app.set_config("--config", "",
+                                "options from this file (TOML), each without its dashes; the "
+                                "command line wins")
+                     ->type_name("FILE");
+  app.add_flag("--check-config", checks_config,
+               "check all " + checks + " as a start would, and exit with 0 or 2")
+      ->needs(config)
+      ->configurable(false);
+}
+
 Status check_option(CLI::App& app, const std::string& key, const std::string& text,
                     const std::function<Status()>& finish) {
   const auto refused = [&key](const std::string& message) {

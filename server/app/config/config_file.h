@@ -17,6 +17,9 @@
 
 namespace trocar::app {
 
+// Adds --config, and --check-config, which says what of a start it `checks`.
+void add_config_options(CLI::App& app, bool& checks_config, const std::string& checks);
+
 // Checks the text of one option alone: its form, its limits.
 using CheckOption = std::function<Status(const std::string& key, const std::string& text)>;
 

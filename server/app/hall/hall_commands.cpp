@@ -22,7 +22,10 @@ namespace trocar::app {
 namespace {
 
 constexpr std::chrono::seconds kAnswer{10};
-constexpr std::chrono::milliseconds kBusWait{700};  // for all halls to answer
+constexpr std::chrono::milliseconds kBusWait{700};     // for all halls to answer
+constexpr std::chrono::milliseconds kFirstWait{2000};  // for the first one
+constexpr std::chrono::seconds kKeyAnswer{2};
+constexpr double kLongSilence_s = 5;
 constexpr std::chrono::milliseconds kStartPoll{300};
 constexpr int kStartPolls = 600;  // 3 min: large organs need long
 
@@ -57,6 +60,8 @@ void print_session(const Json& session) {
                     number(session, "people"), number(session, "time_rate"),
                     number(session, "cores"), word(session, "since"), word(session, "address")));
   if (const auto why = word(session, "failure"); !why.empty()) print("    " + why + "\n");
+  if (const double silence_s = number(session, "silence_s"); silence_s >= kLongSilence_s)
+    print(fmt::format("    does not answer for {:.0f} s, its figures are of then\n", silence_s));
   print_codes(session);
 }
 
@@ -159,7 +164,7 @@ bool is_hall_name(const std::string& name) {
 // Returns those that answer, the one with the most room first.
 std::vector<Json> halls_of(bus::Bus& bus) {
   std::vector<Json> halls;
-  for (const auto& text : bus.ask_all(kDirectorySubject, "", kBusWait)) {
+  for (const auto& text : bus.ask_all(kDirectorySubject, "", kBusWait, kFirstWait)) {
     auto hall = Json::parse(text, nullptr, false);
     if (hall.is_object() && is_hall_name(word(hall, "hall"))) halls.push_back(std::move(hall));
   }
@@ -170,7 +175,6 @@ std::vector<Json> halls_of(bus::Bus& bus) {
 
 void list_all(const std::vector<Json>& halls, bool is_json) {
   if (is_json) return print(to_text(Json{{"halls", halls}}));
-  if (halls.empty()) print("No hall answers.\n");
   for (const auto& hall : halls) {
     print(word(hall, "hall") + "\n");
     print_directory(hall);
@@ -211,14 +215,31 @@ Status end_anywhere(bus::Bus& bus, const std::vector<Json>& halls, const std::st
   return end(BusHallClient(bus, word(with_it[0], "hall"), word(with_it[0], "start"), key), name);
 }
 
+// Says which halls do not know the key. One that does not answer in time is not among them.
+Status check_key(bus::Bus& bus, const std::vector<Json>& halls, const std::string& key) {
+  std::string refused;
+  for (const auto& hall : halls) {
+    const auto name = word(hall, "hall");
+    const BusHallClient client(bus, name, word(hall, "start"), key);
+    // The answer is no JSON and holds no code; a hall that does not believe the proof says no.
+    const auto asked = client.ask("GET", "/healthz", "", kKeyAnswer);
+    if (!asked && asked.error().code == ErrorCode::Refused)
+      refused += (refused.empty() ? "" : ", ") + name + ": " + asked.error().message;
+  }
+  return refused.empty() ? Status() : Status(Error{ErrorCode::Refused, "--key: " + refused});
+}
+
 Status run_on_bus(const HallOptions& options, const std::string& key) {
   const auto bus = bus::Bus::connect(options.nats, "trocar-hall command", false);
   if (!bus) return bus.error();
   const auto halls = halls_of(**bus);
+  if (halls.empty())
+    return Error{ErrorCode::ResourceMissing,
+                 options.nats.url + ": no hall answers: start trocar-hall with this --nats"};
   if (options.command == HallCommand::Start) return start_anywhere(**bus, halls, options, key);
   if (options.command == HallCommand::End) return end_anywhere(**bus, halls, options.what, key);
   list_all(halls, options.is_json);
-  return {};
+  return key.empty() ? Status() : check_key(**bus, halls, key);
 }
 
 }  // namespace

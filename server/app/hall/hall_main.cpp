@@ -6,7 +6,6 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "server/app/hall/hall_bus.h"
 #include "server/app/hall/hall_commands.h"
@@ -77,7 +77,8 @@ Status run_hall(const HallOptions& options) {
     log::info("on the bus as {}", bus->name());
   }
   Ending ending(context, **sessions, **server, bus.get());
-  asio::signal_set signals(context, SIGINT, SIGTERM);
+  asio::signal_set signals(context);
+  for (const int signal : ending_signals()) signals.add(signal);
   signals.async_wait([&](boost::system::error_code error, int) {
     if (!error) ending.begin();
   });
@@ -126,5 +127,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::ignore_broken_pipes();
   return trocar::app::run(argc, argv);
 }

@@ -70,12 +70,13 @@ secure::Digest digest_of(std::string_view text) {
 
 std::string exposition(const hall::Sessions& sessions) {
   std::map<std::string, double> by_state;
-  std::vector<monitoring::Labelled> people, rate, cores;
+  std::vector<monitoring::Labelled> people, rate, cores, silence;
   for (const auto& session : sessions.list()) {
     ++by_state[hall::name_of(session->state)];
     people.emplace_back(session->name, session->figures.people);
     rate.emplace_back(session->name, session->figures.time_rate);
     cores.emplace_back(session->name, session->cores);
+    silence.emplace_back(session->name, hall::silence_s(*session));
   }
   std::vector<monitoring::Labelled> states;
   for (const auto* state : {"starting", "running", "ending", "failed"})
@@ -96,6 +97,8 @@ std::string exposition(const hall::Sessions& sessions) {
   text.gauges("session_people", "People in a session.", "session", people);
   text.gauges("session_time_rate", "Simulated time over real time of a session.", "session", rate);
   text.gauges("session_cores", "Processor seconds per second of a session.", "session", cores);
+  text.gauges("session_silence_seconds", "Time since a running session has last answered.",
+              "session", silence);
   return text.text();
 }
 

@@ -21,8 +21,8 @@ struct HallStart {
 
 // Reads what is there, and makes key, certificate and folder of state if they are missing.
 Result<HallStart> prepare_hall(const HallOptions& options);
-// Says whether prepare_hall() would succeed, and whether each organ can be read, without making
-// anything.
+// Says whether a start would succeed as far as files, folders and organs go, without making
+// anything. What only a start shows is left out: ports, other halls, NATS.
 Status check_hall_start(const HallOptions& options);
 // The key as a file has it, without the line's end. Others may not read that file.
 Result<std::string> read_key(const std::filesystem::path& file);

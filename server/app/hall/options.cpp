@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "common/base/version.h"
+#include "server/app/config/log_options.h"
 #include "server/app/config/nats_options.h"
 
 namespace trocar::app {
@@ -32,8 +33,9 @@ Examples:
   trocar-hall list --nats nats://10.0.0.2:4222
       the sessions of all halls
 
-The key is a file that the hall makes at its first start. Ctrl-C or SIGTERM ends the hall and all its
-sessions in order. When it is killed, its sessions go on, and the next hall finds them again.
+The key is a file that the hall makes at its first start. Ctrl-C, SIGTERM or a closed terminal ends the
+hall and all its sessions in order; under nohup it outlives its terminal. When it is killed, its sessions
+go on, and the next hall finds them again.
 Exit codes: 0 ok, also after Ctrl-C, 2 command line, 3 bad file, 4 the hall says no, 5 port taken or no
 hall there.
 )";
@@ -93,26 +95,19 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
                    "tell others over this NATS what runs here, and take their requests [no]");
   app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
       ->type_name("FILE");
-  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
-      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
-      ->type_name("LEVEL")
-      ->capture_default_str();
-  app.add_option("--log-format", options.log_format,
-                 "how it is said: text, or json: an object per line")
-      ->check(CLI::IsMember({"text", "json"}))
-      ->type_name("FORMAT")
-      ->capture_default_str();
+  add_log_options(app, options.log_level, options.log_format);
   app.require_subcommand(0, 1);
   auto* list = app.add_subcommand("list", "says which sessions run");
   auto* start = app.add_subcommand("start", "starts a session, and says where it is");
   auto* end = app.add_subcommand("end", "ends a session");
   for (auto* command : {list, start, end}) add_command_options(*command, options);
-  start->add_option("what", options.what, "lesson or organ, as the hall's configuration names it")
+  // The names of these are what errors say.
+  start->add_option("LESSON", options.what, "lesson or organ, as the hall's configuration names it")
       ->required()
-      ->type_name("LESSON");
+      ->type_name("");
   start->add_option("--name", options.name, "name of the session [the lesson's, with a number]")
       ->type_name("NAME");
-  end->add_option("session", options.what, "its name")->required()->type_name("NAME");
+  end->add_option("NAME", options.what, "name of the session")->required()->type_name("");
   for (auto* command : {list, start})
     command->add_flag("--json", options.is_json, "write JSON, for scripts");
   try {
@@ -123,6 +118,8 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
     app.exit(error);
     return std::optional<HallOptions>();
   }
+  if (!options.nats.url.empty())
+    if (const auto place = bus::check_place(options.nats); !place) return place.error();
   options.command = list->parsed()    ? HallCommand::List
                     : start->parsed() ? HallCommand::Start
                     : end->parsed()   ? HallCommand::End

@@ -6,10 +6,10 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cmath>
-#include <csignal>
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "common/impair/proxy.h"
 #include "server/app/impair/options.h"
@@ -28,8 +28,7 @@ class Run {
   // From here on signals end it in order.
   void begin() {
     boost::system::error_code ignored;
-    signals_.add(SIGINT, ignored);
-    signals_.add(SIGTERM, ignored);
+    for (const int signal : ending_signals()) signals_.add(signal, ignored);
     signals_.async_wait([this](boost::system::error_code error, int) {
       if (!error) context_.stop();
     });
@@ -103,5 +102,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::ignore_broken_pipes();
   return trocar::app::run(argc, argv);
 }

@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -15,8 +14,11 @@
 #include "common/base/exit_code.h"
 #include "common/base/log.h"
 #include "common/base/number_option.h"
+#include "common/base/printable.h"
 #include "common/base/text_file.h"
+#include "server/app/journal/outputs.h"
 #include "server/app/journal/program_name.h"
+#include "server/app/journal/recordings_of.h"
 #include "server/app/journal/run_program.h"
 #include "server/session/assessment/assessment.h"
 #include "server/session/assessment/report.h"
@@ -50,6 +52,12 @@ class ScratchFolder {
   fs::path path_;
 };
 
+// Empty where there is no such file.
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
 // The pictures are drawn by the client, from the first moments that are some seconds apart.
 Result<std::vector<assessment::Picture>> draw_pictures(const assessment::Assessment& session) {
   std::vector<assessment::Picture> pictures;
@@ -66,8 +74,7 @@ Result<std::vector<assessment::Picture>> draw_pictures(const assessment::Assessm
             "--pictures needs the client of this release");
         !s)
       return s.error();
-    std::ifstream in(folder + "/000001.png", std::ios::binary);
-    std::string png{std::istreambuf_iterator<char>(in), {}};
+    auto png = read_file(folder + "/000001.png");
     if (png.empty())
       return Error{ErrorCode::ResourceMissing, "--pictures: trocar-client has drawn nothing"};
     pictures.push_back({moment.tick, std::move(png)});
@@ -77,23 +84,14 @@ Result<std::vector<assessment::Picture>> draw_pictures(const assessment::Assessm
 
 Status write_pdf(const std::string& page, const std::string& pdf) {
   const ScratchFolder scratch;
-  const auto html = scratch.path() / "report.html";
+  const auto html = scratch.path() / "report.html", made = scratch.path() / "report.pdf";
   if (auto s = write_text_file(html, page); !s) return s;
-  return run_program({"weasyprint", "--quiet", html.string(), pdf},
-                     "--pdf needs it (Debian package weasyprint), or print the page of --html");
-}
-
-Result<std::vector<std::string>> files_of(const std::string& path) {
-  std::error_code error;
-  if (!fs::is_directory(path, error)) return std::vector{path};
-  std::vector<std::string> files;
-  for (fs::directory_iterator it(path, error), end; !error && it != end; it.increment(error))
-    if (it->path().extension() == ".mcap") files.push_back(it->path().string());
-  if (error)
-    return Error{ErrorCode::ResourceMissing, path + ": cannot be read: " + error.message()};
-  if (files.empty()) return Error{ErrorCode::ResourceMissing, path + ": has no recording (.mcap)"};
-  std::ranges::sort(files);
-  return files;
+  if (auto s =
+          run_program({"weasyprint", "--quiet", html.string(), made.string()},
+                      "--pdf needs it (Debian package weasyprint), or print the page of --html");
+      !s)
+    return s;
+  return write_text_file(pdf, read_file(made));
 }
 
 Result<assessment::StrainDamage> measure(const std::string& file,
@@ -111,27 +109,65 @@ Result<assessment::StrainDamage> measure(const std::string& file,
   return strain;
 }
 
-// Reads all; says how far it is where people wait.
+Result<assessment::Assessment> read_one(const std::string& file, const AssessOptions& options) {
+  auto session = assessment::assess(file, {.force_limit_n = options.force_limit_n});
+  if (!session || !options.measures_strain) return session;
+  auto strain = measure(file, *session, options);
+  if (!strain) return strain.error();
+  session->strain = std::move(*strain);
+  return session;
+}
+
+// Says how far it is where people wait.
+void show_count(std::size_t number, std::size_t of) {
+  if (of > 1 && ::isatty(STDERR_FILENO) != 0)
+    std::fprintf(stderr, "%s: %zu of %zu\n", kProgram, number, of);
+}
+
+// The last recording of a session stands for all of it.
+void drop_earlier(std::vector<assessment::Assessment>& sessions) {
+  std::set<fs::path> earlier;
+  for (const auto& session : sessions)
+    for (const auto& part : session.earlier) earlier.insert(fs::path(part.file).lexically_normal());
+  std::erase_if(sessions, [&](const auto& session) {
+    return earlier.contains(fs::path(session.file).lexically_normal());
+  });
+}
+
+// Reads all that are named.
 Result<std::vector<assessment::Assessment>> read_all(const std::vector<std::string>& files,
                                                      const AssessOptions& options) {
   std::vector<assessment::Assessment> sessions;
   for (const auto& file : files) {
-    if (files.size() > 1 && ::isatty(STDERR_FILENO) != 0)
-      std::fprintf(stderr, "%s: %zu of %zu\n", kProgram, sessions.size() + 1, files.size());
-    auto session = assessment::assess(file, {.force_limit_n = options.force_limit_n});
+    show_count(sessions.size() + 1, files.size());
+    auto session = read_one(file, options);
     if (!session) return session.error();
-    if (options.measures_strain) {
-      auto strain = measure(file, *session, options);
-      if (!strain) return strain.error();
-      session->strain = std::move(*strain);
-    }
     sessions.push_back(std::move(*session));
   }
-  // The last recording of a session stands for all of it.
-  std::set<std::string> earlier;
-  for (const auto& session : sessions)
-    for (const auto& part : session.earlier) earlier.insert(part.file);
-  std::erase_if(sessions, [&](const auto& session) { return earlier.contains(session.file); });
+  drop_earlier(sessions);
+  return sessions;
+}
+
+// Reads what is in a folder and those below it. A file that cannot be used is named, with its exit
+// code in `code`; the others are measured.
+Result<std::vector<assessment::Assessment>> read_folder(const AssessOptions& options, int& code) {
+  const fs::path root(options.path);
+  const auto files = recordings_of(root);
+  if (!files) return files.error();
+  std::vector<assessment::Assessment> sessions;
+  std::size_t number = 0;
+  for (const auto& file : *files) {
+    show_count(++number, files->size());
+    auto session = read_one(file.string(), options);
+    if (!session) {
+      code = report(kProgram, session.error());
+      continue;
+    }
+    // Each session of a hall has a folder of its own, and its file the same name as the others'.
+    session->name = printable(file.lexically_relative(root).generic_string());
+    sessions.push_back(std::move(*session));
+  }
+  drop_earlier(sessions);
   return sessions;
 }
 
@@ -165,14 +201,16 @@ std::string overview_of(const std::vector<assessment::Assessment>& sessions) {
     out += fmt::format("{}  {:<24} {:>6.0f} points  {:>7.1f} s  {}\n",
                        assessment::iso_time(session.start_utc_ns),
                        session.lesson ? session.lesson->title : "no lesson", session.points,
-                       session.whole.seconds(), assessment::short_name(session.file));
+                       session.whole.seconds(), session.name);
   return out;
 }
 
 }  // namespace
 
 void add_options(CLI::App& command, AssessOptions& options) {
-  command.add_option("PATH", options.path, "a recording (.mcap), or a folder: learning curves")
+  command
+      .add_option("PATH", options.path,
+                  "a recording (.mcap), or a folder and those below it: learning curves")
       ->required();
   command
       .add_option("--expert", options.experts,
@@ -187,12 +225,14 @@ void add_options(CLI::App& command, AssessOptions& options) {
                    "trocar-client");
   command.add_option("--csv", options.csv, "write all numbers as a table, a row each")
       ->type_name("OUT");
-  command.add_option("--xapi", options.xapi, "write statements for learning systems (JSON)")
-      ->type_name("OUT");
+  auto* xapi =
+      command.add_option("--xapi", options.xapi, "write statements for learning systems (JSON)")
+          ->type_name("OUT");
   command
       .add_option("--home-page", options.home_page,
                   "with --xapi: address of the system that knows the people")
       ->type_name("URL")
+      ->needs(xapi)
       ->capture_default_str();
   command
       .add_option("--force-limit", options.force_limit_n,
@@ -217,10 +257,21 @@ int assess(const AssessOptions& options) {
     return report(kProgram, Error{ErrorCode::Usage,
                                   "assess: --json, --expert and --pictures are for one recording, "
                                   "not for a folder"});
-  const auto files = files_of(options.path);
-  if (!files) return report(kProgram, files.error());
-  auto sessions = read_all(*files, options);
+  if (options.has_pictures && options.html.empty() && options.pdf.empty())
+    return report(kProgram, Error{ErrorCode::Usage,
+                                  "assess: --pictures is for a report: name one by --html or "
+                                  "--pdf"});
+  if (auto s = check_outputs({{"--html", options.html},
+                              {"--pdf", options.pdf},
+                              {"--csv", options.csv},
+                              {"--xapi", options.xapi}});
+      !s)
+    return report(kProgram, s.error());
+  int code = 0;
+  auto sessions =
+      is_folder ? read_folder(options, code) : read_all(std::vector{options.path}, options);
   if (!sessions) return report(kProgram, sessions.error());
+  if (sessions->empty()) return code;
   const auto experts = read_all(options.experts, options);
   if (!experts) return report(kProgram, experts.error());
   std::vector<assessment::Standing> standings;
@@ -236,7 +287,7 @@ int assess(const AssessOptions& options) {
                     : is_folder     ? overview_of(*sessions)
                                     : assessment::summary_of(sessions->front(), standings);
   std::fputs(text.c_str(), stdout);
-  return 0;
+  return code;
 }
 
 }  // namespace trocar::app

@@ -11,13 +11,16 @@
 #include "common/base/cpu.h"
 #include "common/base/json.h"
 #include "common/base/log.h"
+#include "common/base/stdout_check.h"
 #include "common/base/timing.h"
+#include "common/base/unfinished_file.h"
 #include "common/base/version.h"
 #include "common/journal/mcap_repair.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
 #include "server/app/journal/assess_command.h"
 #include "server/app/journal/copy_commands.h"
+#include "server/app/journal/outputs.h"
 #include "server/app/journal/program_name.h"
 #include "server/app/journal/push_command.h"
 #include "server/session/recording/anonymise.h"
@@ -256,9 +259,10 @@ int run(int argc, char** argv) {
       "                                                half a minute of it, which verifies\n"
       "  trocar-journal anonymise session.mcap shared.mcap\n"
       "                                                a copy without names, which verifies\n"
-      "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
-      "could\n"
-      "be verified, though nothing differs: the reasons are printed.");
+      "Exit codes: 0 done or verified, 1 difference found, 2 usage, 3 file cannot be read or is\n"
+      "not overwritten, 4 storage refuses, 5 something is missing or cannot be written, 6 not all\n"
+      "could be verified, though nothing differs: the reasons are printed. A signal such as\n"
+      "SIGTERM ends it without one, and leaves no half of a file.");
   app.require_subcommand(1);
   std::string log_level = "warn", path, repaired_path;
   bool as_json = false;
@@ -333,6 +337,8 @@ int run(int argc, char** argv) {
       return report(kProgram, Error{ErrorCode::Usage,
                                     "export: say what, with --forces OUT or "
                                     "--lesson OUT"});
+    if (auto s = check_outputs({{"--forces", force_table}, {"--lesson", lesson_table}}); !s)
+      return report(kProgram, s.error());
     const int forces = force_table.empty() ? 0 : export_forces(path, force_table);
     return forces != 0 || lesson_table.empty() ? forces : export_lesson(path, lesson_table);
   }
@@ -344,5 +350,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(trocar::app::kProgram);
-  return trocar::app::run(argc, argv);
+  trocar::remove_unfinished_files_on_signals();
+  return trocar::finish_output(trocar::app::kProgram, trocar::app::run(argc, argv));
 }

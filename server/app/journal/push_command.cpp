@@ -4,46 +4,22 @@
 
 #include <CLI/CLI.hpp>
 
-#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <vector>
 
 #include "common/base/printable.h"
 #include "common/base/result.h"
 #include "common/journal/mcap_reader.h"
 #include "server/app/journal/program_name.h"
+#include "server/app/journal/recordings_of.h"
 #include "server/session/archive/push.h"
 
 namespace trocar::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kMostFiles = 100'000;
-
-// Recordings of a folder and those below it, sorted; the path alone if it is a file.
-Result<std::vector<fs::path>> recordings_of(const fs::path& path) {
-  std::error_code failed;
-  if (!fs::is_directory(path, failed)) return std::vector{path};
-  std::vector<fs::path> files;
-  for (fs::recursive_directory_iterator it(path, failed), end; !failed && it != end;
-       it.increment(failed)) {
-    if (it->path().extension() == ".mcap" && it->is_regular_file(failed))
-      files.push_back(it->path());
-    if (files.size() > kMostFiles)
-      return Error{ErrorCode::Usage, path.string() + ": holds more than 100000 recordings"};
-  }
-  if (failed)
-    return Error{ErrorCode::ResourceMissing,
-                 path.string() + ": cannot be read: " + failed.message()};
-  if (files.empty())
-    return Error{ErrorCode::ResourceMissing, path.string() + ": has no recording (.mcap)"};
-  std::ranges::sort(files);
-  return files;
-}
 
 std::string region_of(const PushCommand& options) {
   if (!options.region.empty()) return options.region;

@@ -9,15 +9,17 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/base/own_folder.h"
+
 extern char** environ;
 
 namespace trocar::app {
 
 Status run_program(std::vector<std::string> words, const std::string& help) {
   const auto name = words.front();
-  std::error_code error;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / name;
-  if (std::filesystem::exists(beside, error)) words.front() = beside.string();
+  std::error_code ignored;
+  const auto beside = own_folder() / name;
+  if (std::filesystem::exists(beside, ignored)) words.front() = beside.string();
   std::vector<char*> arguments;
   for (auto& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);

@@ -6,11 +6,12 @@
 #include <map>
 
 #include "common/base/cpu.h"
+#include "common/base/progress_line.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
 #include "common/plot/plot.h"
+#include "server/app/organ/organ_reduce.h"
 #include "server/app/organ/program_name.h"
-#include "server/app/organ/progress_line.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/organ_file.h"
 
@@ -145,7 +146,8 @@ void add_calibrate_command(CLI::App& app, CalibrateCommand& command) {
   sub->add_option("--seed", command.settings.seed, "draws the first place")
       ->type_name("S")
       ->capture_default_str();
-  sub->add_option("--radius", command.radius_mm, "of the round tip, mm [3.2 edges of the surface]")
+  sub->add_option("--radius", command.radius_mm,
+                  "of the round tip, 0.5 to 50 mm [3.2 edges of the surface]")
       ->type_name("MM");
   sub->add_option("--depth", command.depth_mm, "of the deepest press, mm")
       ->type_name("MM")
@@ -162,20 +164,18 @@ void add_calibrate_command(CLI::App& app, CalibrateCommand& command) {
 Status run_calibrate(CalibrateCommand command) {
   auto& settings = command.settings;
   settings.error = command.error_percent / 100;
-  settings.radius_m = command.radius_mm * 1e-3;
+  if (command.radius_mm) settings.radius_m = *command.radius_mm * 1e-3;
   settings.depth_m = command.depth_mm * 1e-3;
   if (auto s = calibration::validate(settings); !s) return s;
   auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
+  if (auto s = calibration::check_held(*organ); !s) return s;
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
       command.folder.empty() ? "out/calibrate-" + stem : command.folder;
   const std::string out = command.out.empty() ? stem + "-calibrated.organ" : command.out;
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed)
-    return Error{ErrorCode::ResourceMissing,
-                 folder.string() + ": cannot be made (" + failed.message() + "), see --results"};
+  if (auto s = organ::check_organ_name(out); !s) return s;
+  if (auto s = check_outputs(folder, out); !s) return s;
 
   const auto begin = monotonic_ns();
   const auto cpu = thread_cpu_ns();

@@ -3,6 +3,7 @@
 // This is the calibrate command of trocar-organ.
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "common/base/result.h"
@@ -12,7 +13,8 @@ namespace trocar::app {
 
 struct CalibrateCommand {
   std::string organ, out, folder;
-  double error_percent = 3, radius_mm = 0, depth_mm = 12;
+  double error_percent = 3, depth_mm = 12;
+  std::optional<double> radius_mm;
   std::size_t check_places = 4;
   calibration::Settings settings;
 };

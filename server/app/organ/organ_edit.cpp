@@ -5,11 +5,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/base/own_folder.h"
 #include "server/app/organ/organ_print.h"
 #include "server/app/organ/program_name.h"
 
@@ -47,10 +47,8 @@ Status run_edit(const edit_command::EditCommand& command, int argc, char** argv)
     return Error{ErrorCode::ResourceMissing,
                  "edit: there is no display for a window: start it in a desktop session, or say "
                  "--headless with --hold, --release, --region, --give or --material"};
-  std::error_code error;
-  const auto own = std::filesystem::read_symlink("/proc/self/exe", error);
-  auto program = (own.parent_path() / kWindowProgram).string();
-  if (error || ::access(program.c_str(), X_OK) != 0)
+  auto program = (own_folder() / kWindowProgram).string();
+  if (::access(program.c_str(), X_OK) != 0)
     return Error{ErrorCode::ResourceMissing,
                  std::string("edit: the window's program ") + kWindowProgram +
                      " is not beside this one: install trocar-client, or build with "

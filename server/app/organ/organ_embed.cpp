@@ -93,6 +93,9 @@ void add_embed_options(CLI::App& app, EmbedCommand& command) {
 
 Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ::Organ& organ) {
   if (command.file.empty()) return {};
+  if (!formats::is_mesh_file(command.file))
+    return Error{ErrorCode::BadFile,
+                 command.file + ": is of no kind that --embed reads: " + formats::kSurfaceEndings};
   auto file = formats::read_mesh_file(command.file);
   if (!file) return file.error();
   const auto* raw = std::get_if<surface::RawSurface>(&*file);
@@ -116,6 +119,7 @@ Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ
     auto picture = formats::read_foreign_file(command.picture);
     if (!picture) return picture.error();
     options.picture = std::move(*picture);
+    options.picture_name = command.picture;
   } else {
     options.picture = raw->picture;
   }

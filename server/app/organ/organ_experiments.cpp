@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "common/base/writable.h"
 #include "common/plot/plot.h"
 #include "server/app/organ/program_name.h"
 #include "server/lab/fit/fit.h"
@@ -52,8 +53,10 @@ void print_run(int run, const std::vector<fit::FittedParameter>& tried, double r
 void print_fit(const fit::Fit& fit) {
   for (const auto& p : fit.parameters) {
     std::printf("%-22s %.6g", p.key.c_str(), p.value);
-    if (p.standard_error)
+    if (p.standard_error && p.is_determined())
       std::printf(" +- %.2g", *p.standard_error);
+    else if (p.standard_error)
+      std::printf(" (not determined)");
     else
       std::printf(" (the data do not tell how exactly)");
     std::printf("  (started from %.6g)\n", p.start);
@@ -61,6 +64,9 @@ void print_fit(const fit::Fit& fit) {
   std::printf("residual               %.4g N rms, %.2f %% of the largest measured force\n",
               fit.rms_n, fit.rms_percent);
   std::printf("runs of the scenario   %d\n", fit.runs);
+  std::fflush(stdout);
+  for (const auto& remark : fit.remarks())
+    std::fprintf(stderr, "%s: warning: %s\n", kProgram, remark.c_str());
   if (!fit.is_converged)
     std::fprintf(stderr, "%s: warning: the fit was still improving when it was ended\n", kProgram);
   if (fit.has_unconverged_steps)
@@ -118,16 +124,21 @@ Status run_fit(const FitCommand& command) {
   if (!resolved) return resolved.error();
   const auto measured = fit::read_measurements(command.curve_file);
   if (!measured) return measured.error();
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed)
-    return Error{ErrorCode::ResourceMissing,
-                 folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
+  if (auto s = check_writable_folder(folder); !s) return s;
+  if (!command.organ.empty()) {
+    if (auto s = organ::check_organ_name(command.organ); !s) return s;
+    if (auto s = check_writable(command.organ); !s) return s;
+  }
   const fit::FitOptions options{command.parameters, command.region, command.curve,
                                 scenario::Solver::Full};
   const auto fitted = fit::fit(*resolved, *measured, options, print_run);
   if (!fitted) return fitted.error();
   print_fit(*fitted);
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed)
+    return Error{ErrorCode::ResourceMissing,
+                 folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
   if (auto s = write_text_file(folder / "material.toml", fit::to_toml(*fitted, options)); !s)
     return s;
   if (auto s = write_text_file(folder / "fit.csv", to_csv(*measured, *fitted)); !s) return s;
@@ -168,11 +179,13 @@ Status run_settle(const SettleCommand& command) {
     gravity = {0, -9.81, 0};
   if (!is_finite(gravity) || length(gravity) > 1000)
     return Error{ErrorCode::Usage, "--gravity must be finite and at most 1000 m/s^2"};
-  const auto settled = scenario::settle(*organ, gravity);
-  if (!settled) return settled.error();
   const std::string path =
       command.out.empty() ? std::filesystem::path(command.organ).stem().string() + "-settled.organ"
                           : command.out;
+  if (auto s = organ::check_organ_name(path); !s) return s;
+  if (auto s = check_writable(path); !s) return s;
+  const auto settled = scenario::settle(*organ, gravity);
+  if (!settled) return settled.error();
   if (auto s = organ::write_organ(path, settled->organ); !s) return s;
   std::printf(
       "%s: nodes moved by %.3g mm at most, %.3g mm on average; %u sweeps, %.2g N out of "

@@ -1,5 +1,7 @@
 #include "server/app/organ/organ_export.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <utility>
@@ -44,6 +46,19 @@ formats::GlbSurface fine_surface_of(const organ::Organ& organ) {
   return surface;
 }
 
+// Numbers of STL have 24 bits: far from the origin, vertices beside each other become one.
+bool is_too_far_for_stl(const organ::Organ& organ) {
+  const auto& mesh = organ.mesh;
+  double farthest = 0, shortest = INFINITY;
+  for (const Vec3d& p : mesh.rest_positions)
+    farthest = std::max(farthest, length(p + organ.source_offset_m));
+  for (const auto& [a, b, c] : mesh.boundary_triangles)
+    for (const auto& [from, to] : {std::pair(a, b), {b, c}, {c, a}})
+      shortest = std::min(shortest,
+                          length(mesh.rest_positions[to.value] - mesh.rest_positions[from.value]));
+  return farthest * 0x1p-23 > 0.01 * shortest;
+}
+
 }  // namespace
 
 Status run_export(const ExportCommand& command) {
@@ -58,8 +73,19 @@ Status run_export(const ExportCommand& command) {
     return Error{ErrorCode::Usage, "--unit: " + command.out + ": .glb is in m"};
   const auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
+  std::error_code ignored;
+  if (std::filesystem::exists(command.out, ignored) &&
+      organ->source.starts_with(std::filesystem::path(command.out).filename().string() + ","))
+    return Error{ErrorCode::Usage, "--out: " + command.out +
+                                       ": the organ was made from a file of this name, which "
+                                       "would be lost: choose another name"};
   if (has_tets && organ->mesh.tets.empty())
     return Error{ErrorCode::Usage, command.organ + ": has no tetrahedra, only .stl and .glb apply"};
+  if (ending == ".stl" && is_too_far_for_stl(*organ))
+    return Error{ErrorCode::Usage,
+                 "--out: " + command.out + ": " + command.organ +
+                     " lies so far from its file's origin that the numbers of .stl are too short "
+                     "for it: write .msh, .vtu or .glb"};
   formats::WrittenMesh written{.mesh = organ->mesh,
                                .name = organ->name,
                                .offset_m = organ->source_offset_m,

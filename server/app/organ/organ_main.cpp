@@ -13,6 +13,7 @@
 #include "common/base/cpu.h"
 #include "common/base/log.h"
 #include "common/base/number_option.h"
+#include "common/base/stdout_check.h"
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_edit.h"
@@ -40,7 +41,7 @@ namespace trocar::app {
 namespace {
 
 // From here on the work takes longer than two seconds, and a line says that it goes on.
-constexpr int kManyTets = 100'000;
+constexpr int kManyTets = 100'000, kManyNodes = 20'000;
 constexpr std::uintmax_t kLargeFileBytes = 20'000'000;
 constexpr std::string_view kFixSet = "set:";
 
@@ -215,7 +216,13 @@ Status change_organ(const Options& options, bool averages, organ::Organ& organ) 
   return organ::validate(organ);
 }
 
+// Checked before any work is done.
+Status check_out(const Options& options) {
+  return options.out.empty() ? Status() : organ::check_organ_name(options.out);
+}
+
 Status run_make(const Options& options) {
+  if (auto status = check_out(options); !status) return status;
   auto organ = make_named(options.made_name, options.tets);
   if (!organ) return organ.error();
   if (auto changed = change_organ(options, !options.material.empty(), *organ); !changed)
@@ -272,6 +279,7 @@ Result<catalogue::ImportedOrgan> read(const std::filesystem::path& path,
 }
 
 Status run_import(const Options& options) {
+  if (auto status = check_out(options); !status) return status;
   const auto unit = mesh::parse_unit(options.unit);
   if (!unit) return unit.error();
   catalogue::ImportOptions import_options;
@@ -296,6 +304,10 @@ Status run_import(const Options& options) {
       !missing && bytes >= kLargeFileBytes)
     std::fprintf(stderr, "%s: reading %s, %s MB, this takes some seconds\n", kProgram,
                  options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
+  if (options.import_nodes.value_or(0) >= kManyNodes)
+    std::fprintf(stderr, "%s: filling %s with about %s nodes, this takes some seconds\n", kProgram,
+                 options.import_file.c_str(),
+                 grouped(static_cast<std::size_t>(*options.import_nodes)).c_str());
   auto imported = read(path, import_options);
   if (!imported) return imported.error();
   if (auto chosen = choose_law(options, imported->organ.material); !chosen) return chosen;
@@ -323,6 +335,9 @@ Status run_import(const Options& options) {
 }
 
 Status run_inspect(const Options& options) {
+  if (!options.picture.empty() && std::filesystem::path(options.picture).extension() != ".png")
+    return Error{ErrorCode::Usage,
+                 "--picture: " + options.picture + ": the file's name must end with .png"};
   const auto organ = catalogue::load_organ(options.inspected);
   if (!organ) return organ.error();
   options.json ? print_json(*organ) : print_text(*organ);
@@ -534,5 +549,5 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features("trocar-organ");
-  return trocar::app::run(argc, argv);
+  return trocar::finish_output("trocar-organ", trocar::app::run(argc, argv));
 }

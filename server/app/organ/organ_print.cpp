@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 
 #include "common/base/json.h"
@@ -162,8 +163,10 @@ void print_text(const organ::Organ& organ) {
                 fine.picture.empty() ? "" : ", with a picture");
   std::printf("  size                %.1f x %.1f x %.1f mm\n", size.x, size.y, size.z);
   const Vec3d offset = organ.source_offset_m * 1e3;
-  std::printf("  offset              %.4g %.4g %.4g mm: add it to a position to get the source's\n",
-              offset.x, offset.y, offset.z);
+  const auto rounded = [](double mm) { return std::round(mm * 1e3) / 1e3 + 0.0; };
+  std::printf(
+      "  offset              %.10g %.10g %.10g mm: add it to a position to get the source's\n",
+      rounded(offset.x), rounded(offset.y), rounded(offset.z));
   std::printf("  volume              %.4g l\n", organ::enclosed_volume(mesh) * 1e3);
   std::printf("  mass                %.4g kg\n", organ::mass_kg(organ));
   std::printf("  edge lengths        %.2f / %.2f / %.2f mm (least, mean, largest)\n", edges.min_mm,

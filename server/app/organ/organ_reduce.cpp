@@ -5,12 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "common/base/progress_line.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/base/writable.h"
 #include "common/plot/plot.h"
 #include "server/app/organ/organ_reduce_local.h"
 #include "server/app/organ/program_name.h"
-#include "server/app/organ/progress_line.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
 #include "server/papers/dogan/quality.h"
@@ -324,12 +325,7 @@ Status check_outputs(const std::filesystem::path& folder, const std::string& out
   if (failed)
     return Error{ErrorCode::ResourceMissing,
                  folder.string() + ": cannot be made (" + failed.message() + "), see --results"};
-  // Not after minutes of work.
-  if (const auto parent = std::filesystem::path(out).parent_path();
-      !parent.empty() && !std::filesystem::is_directory(parent, failed))
-    return Error{ErrorCode::ResourceMissing,
-                 out + ": cannot be written, its folder is not there, see --out"};
-  return {};
+  return check_writable(out);
 }
 
 void add_reduce_command(CLI::App& app, ReduceCommand& command) {

@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "common/base/progress_line.h"
 #include "common/base/text_file.h"
 #include "server/app/organ/program_name.h"
-#include "server/app/organ/progress_line.h"
 #include "server/lab/reduce/local_quality.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"

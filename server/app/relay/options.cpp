@@ -6,6 +6,7 @@
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "server/app/config/config_file.h"
+#include "server/app/config/log_options.h"
 #include "server/app/config/nats_options.h"
 #include "server/app/config/place.h"
 #include "server/broadcast/subjects.h"
@@ -30,7 +31,8 @@ Examples:
   trocar-relay --from-nats monday --nats nats://10.0.0.2:4222 --code CODE --port 7695
       one of many relays that take it from there: the server sends nothing more for them
   trocar-relay --config relay.toml --check-config
-      are these options fine? deploy/trocar-relay.toml.example has all of them
+      are these options fine, and the files that they name? It asks no server and no NATS;
+      deploy/trocar-relay.toml.example has all options
 
 Exit codes: 0 ok, also when the session has ended, 2 command line, 3 bad file, 4 refused by the
 server, 5 port taken, no server, or nobody who publishes.
@@ -125,23 +127,8 @@ CommandLine::CommandLine() {
   app_.add_option("--ready-file", options_.ready_file,
                   "write the port to this file when there is a picture to show")
       ->type_name("FILE");
-  app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
-      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
-      ->type_name("LEVEL")
-      ->capture_default_str();
-  app_.add_option("--log-format", options_.log_format,
-                  "how it is said: text, or json: an object per line")
-      ->check(CLI::IsMember({"text", "json"}))
-      ->type_name("FORMAT")
-      ->capture_default_str();
-  auto* config = app_.set_config("--config", "",
-                                 "options from this file (TOML), each without its dashes; the "
-                                 "command line wins")
-                     ->type_name("FILE");
-  app_.add_flag("--check-config", options_.checks_config,
-                "check all options as a start would, and exit with 0 or 2")
-      ->needs(config)
-      ->configurable(false);
+  add_log_options(app_, options_.log_level, options_.log_format);
+  add_config_options(app_, options_.checks_config, "options and files");
   add_nats_options();
   add_access_options();
 }

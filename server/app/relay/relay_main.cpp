@@ -5,6 +5,7 @@
 #include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "server/app/relay/relay_server.h"
 
 namespace trocar::app {
@@ -22,6 +23,8 @@ int run(int argc, char** argv) {
     return report(kProgram, set.error());
   log::use_format(options.log_format);
   if (options.checks_config) {
+    if (const auto fine = check_relay(options); !fine)
+      return report(kProgram, {ErrorCode::Usage, options.origins.placed(fine.error().message)});
     std::printf("%s: fine\n", options.config_file.c_str());
     return static_cast<int>(ExitCode::Ok);
   }
@@ -35,5 +38,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::ignore_broken_pipes();
   return trocar::app::run(argc, argv);
 }

@@ -9,13 +9,14 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/text_file.h"
+#include "common/base/writable.h"
 #include "common/secure/certificate.h"
 #include "common/secure/kept_identity.h"
 #include "common/secure/link_file.h"
@@ -44,6 +45,29 @@ struct Access {
   secure::JoinCode server;  // of the server
 };
 
+Result<fs::path> state_folder(const RelayOptions& options) {
+  if (!options.state_folder.empty()) return fs::absolute(options.state_folder);
+  return secure::default_state_folder();
+}
+
+Status check_certificate(const RelayOptions& options) {
+  const auto folder = state_folder(options);
+  if (!folder) return folder.error();
+  const bool is_own = options.certificate_file.empty();
+  if (is_own)
+    if (const auto fine = secure::check_private_folder(*folder); !fine)
+      return Error{fine.error().code, "--state: " + fine.error().message};
+  std::error_code ignored;
+  const bool is_made =
+      fs::exists(*folder / "server.crt", ignored) && fs::exists(*folder / "server.key", ignored);
+  if (is_own && !is_made) return {};
+  const auto kept =
+      secure::read_or_make_identity(options.certificate_file, options.key_file, *folder, "server");
+  if (!kept) return kept.error();
+  const auto tls = secure::make_server_context(kept->identity, kept->source);
+  return tls ? Status() : Status(tls.error());
+}
+
 Result<Access> prepare_access(const RelayOptions& options) {
   Access access;
   if (options.code) {
@@ -56,18 +80,13 @@ Result<Access> prepare_access(const RelayOptions& options) {
     if (!known) return Error{known.error().code, "--code: " + known.error().message};
     access.server = *known;
   }
-  fs::path folder = options.state_folder;
-  if (folder.empty()) {
-    auto usual = secure::default_state_folder();
-    if (!usual) return usual.error();
-    folder = std::move(*usual);
-  }
-  folder = fs::absolute(folder);
+  const auto folder = state_folder(options);
+  if (!folder) return folder.error();
   if (options.certificate_file.empty())
-    if (const auto made = secure::make_private_folder(folder); !made) return made.error();
+    if (const auto made = secure::make_private_folder(*folder); !made) return made.error();
   // The name of a server's: on one machine both show one certificate, and codes are good for both.
   const auto kept =
-      secure::read_or_make_identity(options.certificate_file, options.key_file, folder, "server");
+      secure::read_or_make_identity(options.certificate_file, options.key_file, *folder, "server");
   if (!kept) return kept.error();
   auto tls = secure::make_server_context(kept->identity, kept->source);
   if (!tls) return tls.error();
@@ -138,7 +157,7 @@ class RelayServer {
   asio::io_context& io_;
   const RelayOptions& options_;
   const Access access_;
-  asio::signal_set signals_{io_, SIGINT, SIGTERM};
+  asio::signal_set signals_{io_};
   asio::steady_timer limit_{io_};
   relay::Relay relay_;
   std::unique_ptr<monitoring::FiguresServer> figures_;  // null: not asked for
@@ -250,6 +269,7 @@ void RelayServer::end() {
 
 Status RelayServer::run() {
   if (auto opened = open_figures(); !opened) return opened;
+  for (const int signal : ending_signals()) signals_.add(signal);
   signals_.async_wait([this](boost::system::error_code error, int) {
     if (!error) end();
   });
@@ -265,6 +285,20 @@ Status RelayServer::run() {
 }
 
 }  // namespace
+
+Status check_relay(const RelayOptions& options) {
+  if (const auto fine = net::check_listen_address(options.address); !fine) return fine;
+  if (!options.metrics_address.empty())
+    if (const auto fine = monitoring::check_figures_address(options.metrics_address); !fine)
+      return fine;
+  if (const auto fine = check_certificate(options); !fine) return fine;
+  if (!options.nats.url.empty())
+    if (const auto fine = bus::Bus::check(options.nats); !fine) return fine;
+  if (options.ready_file.empty()) return {};
+  const auto fine = check_writable(options.ready_file);
+  return fine ? Status()
+              : Status(Error{fine.error().code, "--ready-file: " + fine.error().message});
+}
 
 Status run_relay(const RelayOptions& options) {
   auto access = prepare_access(options);

@@ -12,4 +12,8 @@ namespace trocar::app {
 // session, or why it could not go on.
 Status run_relay(const RelayOptions& options);
 
+// Says whether the addresses and files that the options name can be used, without making anything
+// or asking anybody.
+Status check_relay(const RelayOptions& options);
+
 }  // namespace trocar::app

@@ -1,10 +1,10 @@
 #include "server/app/server/check_start.h"
 
-#include <unistd.h>
-
 #include <filesystem>
 #include <string>
 
+#include "common/base/kept_file.h"
+#include "common/base/writable.h"
 #include "common/journal/session_journal.h"
 #include "server/app/server/admission.h"
 #include "server/app/server/session_start.h"
@@ -18,24 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Status check_writable(const fs::path& path) {
-  std::error_code ignored;
-  if (fs::exists(path, ignored)) {
-    if (!fs::is_directory(path, ignored) && ::access(path.c_str(), W_OK) == 0) return {};
-    return Error{ErrorCode::ResourceMissing,
-                 path.string() + " cannot be written, name another file"};
-  }
-  const auto folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  if (fs::is_directory(folder, ignored) && ::access(folder.c_str(), W_OK | X_OK) == 0) return {};
-  return Error{ErrorCode::ResourceMissing,
-               folder.string() + " is no folder that can be written to, make it"};
-}
-
 // A recording never replaces another one; a device may take it.
 Status check_journal(const fs::path& path) {
   std::error_code ignored;
   if (fs::is_regular_file(path, ignored))
-    return Error{ErrorCode::ResourceMissing, path.string() + " exists already, name another file"};
+    return Error{ErrorCode::BadFile, path.string() + " exists already, name another file"};
   return check_writable(path);
 }
 
@@ -51,6 +38,20 @@ Status check_organ(const ServerOptions& options,
 }
 
 }  // namespace
+
+Status check_end(const ServerOptions& options) {
+  for (const auto& [key, file] :
+       {std::pair{"--summary", &options.summary_file}, {"--ready-file", &options.ready_file}})
+    if (!file->empty()) {
+      if (fs::path(*file).lexically_normal() == fs::path(options.journal).lexically_normal())
+        return Error{ErrorCode::Usage,
+                     std::string(key) + ": " + *file + " is --journal, too: choose another name"};
+      if (auto kept = refuse_to_replace_kept(key, *file); !kept) return kept;
+      if (const auto s = check_writable(*file); !s)
+        return Error{s.error().code, std::string(key) + ": " + s.error().message};
+    }
+  return {};
+}
 
 Status check_start(const ServerOptions& options) {
   // Puts the option's place before an error that does not have it yet.
@@ -78,12 +79,9 @@ Status check_start(const ServerOptions& options) {
   if (const auto s = check_organ(options, of); !s) return s;
   if (options.journal != "none")
     if (const auto s = check_journal(options.journal); !s) return of("journal", s);
-  for (const auto& [key, file] : {std::pair{"audit", &access.audit_file},
-                                  {"summary", &options.summary_file},
-                                  {"ready-file", &options.ready_file}})
-    if (!file->empty())
-      if (const auto s = check_writable(*file); !s) return of(key, s);
-  return {};
+  if (!access.audit_file.empty())
+    if (const auto s = check_writable(access.audit_file); !s) return of("audit", s);
+  return of("summary", check_end(options));
 }
 
 }  // namespace trocar::app

@@ -10,4 +10,8 @@ namespace trocar::app {
 // the option and where it comes from.
 Status check_start(const ServerOptions& options);
 
+// Says whether what a session writes besides its recording can be written: --summary at its end,
+// and --ready-file. A start asks this before it does anything else.
+Status check_end(const ServerOptions& options);
+
 }  // namespace trocar::app

@@ -9,6 +9,7 @@
 #include "common/base/workers.h"
 #include "common/discovery/notice.h"
 #include "server/app/config/config_file.h"
+#include "server/app/config/log_options.h"
 #include "server/app/config/place.h"
 #include "server/app/server/journal_sink.h"
 #include "server/tissue/step/simulation.h"
@@ -238,7 +239,6 @@ class CommandLine {
 
  private:
   void add_session_options();
-  void add_config_options();
 
   ServerOptions options_;
   std::string listen_ = "127.0.0.1:7690", metrics_;
@@ -255,7 +255,7 @@ CommandLine::CommandLine() {
   app_.set_version_flag("--version", version_text())->configurable(false);
   app_.get_help_ptr()->configurable(false);
   add_session_options();
-  add_config_options();
+  add_config_options(app_, options_.checks_config, "options and files");
   add_access_options(app_, options_.access);
   add_limit_options(app_, options_.limits);
   add_research_options(app_, options_, research_);
@@ -321,26 +321,7 @@ void CommandLine::add_session_options() {
       ->check(CLI::Range(1u, kMaxWorkers))
       ->capture_default_str()
       ->group("Speed");
-  app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
-      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
-      ->type_name("LEVEL")
-      ->capture_default_str();
-  app_.add_option("--log-format", options_.log_format,
-                  "how it is said: text, or json: an object per line")
-      ->check(CLI::IsMember({"text", "json"}))
-      ->type_name("FORMAT")
-      ->capture_default_str();
-}
-
-void CommandLine::add_config_options() {
-  auto* config = app_.set_config("--config", "",
-                                 "options from this file (TOML), each without its dashes; the "
-                                 "command line wins")
-                     ->type_name("FILE");
-  app_.add_flag("--check-config", options_.checks_config,
-                "check all options and files as a start would, and exit with 0 or 2")
-      ->needs(config)
-      ->configurable(false);
+  add_log_options(app_, options_.log_level, options_.log_format);
 }
 
 Status CommandLine::check(const std::string& key, const std::string& text) {

@@ -23,12 +23,14 @@
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/discovery/announcer.h"
 #include "common/secure/loopback.h"
 #include "server/app/server/admission.h"
+#include "server/app/server/check_start.h"
 #include "server/app/server/server_figures.h"
 #include "server/app/server/session_start.h"
 #include "server/app/server/simulation_loop.h"
@@ -301,8 +303,7 @@ LoopOptions Server::loop_options() {
 Status Server::run() {
   const auto begin = monotonic_ns();
   boost::system::error_code ignored;
-  signals_.add(SIGINT, ignored);
-  signals_.add(SIGTERM, ignored);
+  for (const int signal : ending_signals()) signals_.add(signal, ignored);
   signals_.async_wait([this](boost::system::error_code error, int signal) {
     if (!error) on_signal(signal);
   });
@@ -343,10 +344,12 @@ void Server::attend() {
 }
 
 void Server::on_signal(int signal) {
-  log::info("{}: ending the session", signal == SIGINT ? "Ctrl-C" : "SIGTERM");
+  log::info("{}: ending the session", name_of_signal(signal));
   loop_->request_stop();
   signals_.cancel();
-  signals_.clear();  // a second one ends the process at once
+  // A second one ends the process at once. A closed terminal may say SIGHUP twice.
+  boost::system::error_code ignored;
+  for (const int ending : {SIGINT, SIGTERM}) signals_.remove(ending, ignored);
 }
 
 void Server::publish_frames() {
@@ -549,6 +552,7 @@ Status Server::write_end() {
 Status run_server(const ServerOptions& options) {
   if (!options.access.revoke.empty() || !options.access.new_code.empty())
     return change_codes(options.access, options.address, options.port);
+  if (const auto writable = check_end(options); !writable) return writable;
   auto admission =
       Admission::prepare(options.access, options.address, !options.resume_file.empty());
   if (!admission) return admission.error();

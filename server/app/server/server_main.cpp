@@ -5,6 +5,7 @@
 #include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/time_slice.h"
 #include "server/app/server/check_start.h"
 #include "server/app/server/options.h"
@@ -26,6 +27,7 @@ int check_config(const trocar::app::ServerOptions& options) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(kProgram);
+  trocar::ignore_broken_pipes();
   const auto parsed = trocar::app::parse_command_line(argc, argv);
   if (!parsed) return trocar::report(kProgram, parsed.error());
   if (!*parsed) return static_cast<int>(trocar::ExitCode::Ok);

@@ -125,6 +125,9 @@ Result<SessionStart> go_on(const ServerOptions& options) {
       log::warn("{}: {}, and stages are counted from there", options.resume_file,
                 session->course_lacks);
     start.course = std::make_shared<lesson::Course>(*std::move(session->course));
+  } else if (options.lesson) {
+    return Error{ErrorCode::Usage, "--lesson: the session of " + options.resume_file +
+                                       " gives no lesson, leave out --lesson"};
   }
   if (options.bleeds && !session->bleeding)
     return Error{ErrorCode::Usage, "--bleeding: the session of " + options.resume_file +

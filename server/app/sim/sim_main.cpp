@@ -13,6 +13,7 @@
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/stdout_check.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "server/app/sim/program_name.h"
@@ -31,6 +32,7 @@ namespace trocar::app {
 namespace {
 
 constexpr double kTick_s = 1e-3;
+constexpr std::uint64_t kLookSteps = 10;  // from one look at the tets to the next
 constexpr std::uint64_t kProgressAfter_ns = 2'000'000'000, kProgressEvery_ns = 500'000'000;
 
 constexpr const char* kExamples = R"(
@@ -101,7 +103,14 @@ struct Totals {
   std::size_t most_active = 0;
   float worst_residual_n = 0;
   double first_rejected_s = 0;
+  std::size_t most_inverted = 0;
+  double first_inverted_s = 0;
 
+  void look_at_tets(const scenario::ScenarioRun& run) {
+    const auto count = run.inverted_tets();
+    if (most_inverted == 0) first_inverted_s = run.time_s();
+    most_inverted = std::max(most_inverted, count);
+  }
   void add(double time_s, const scenario::StepReport& report) {
     sweeps += report.solve.sweeps;
     unconverged += report.is_converged ? 0 : 1;
@@ -124,9 +133,13 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
   if (is_plotted) plots.emplace(run);
   Progress progress;
   if (auto s = write_due_field(); !s) return s;
+  totals.look_at_tets(run);
+  const bool is_static = run.scenario().run.mode == scenario::RunMode::Static;
   while (!run.is_finished() && has_stop_signal == 0) {
     const auto report = run.step();
     totals.add(run.time_s(), report);
+    if (is_static || run.steps_done() % kLookSteps == 0 || run.is_finished())
+      totals.look_at_tets(run);
     if (journal != nullptr) {
       auto& simulation = run.simulation();
       journal->add(simulation.pop_frame(), run.inputs(), run.decisions(),
@@ -167,6 +180,15 @@ void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
                  "%s: warning: some nodes had no finite step, first at %.3f s: loads are too large "
                  "for this material\n",
                  kProgram, totals.first_rejected_s);
+  if (totals.most_inverted > 0)
+    std::fprintf(stderr,
+                 "%s: warning: up to %zu of %zu tets are inside out, first seen at %.3f s: the "
+                 "material is too soft for these loads%s\n",
+                 kProgram, totals.most_inverted, run.organ().mesh.tets.size(),
+                 totals.first_inverted_s,
+                 run.organ().material.elastic_law == material::ElasticLaw::Springs
+                     ? ", and springs fold first: elastic_law = \"neo-hookean\" bears more"
+                     : "");
   std::printf(
       "%s: %.3f s of %s, %zu nodes, at most %zu active, %.1f sweeps per step, residual at "
       "most %.2g N\n",
@@ -346,5 +368,5 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features("trocar-sim");
-  return trocar::app::run(argc, argv);
+  return trocar::finish_output("trocar-sim", trocar::app::run(argc, argv));
 }

@@ -24,6 +24,7 @@ constexpr int kNotStarted = 127;
 // After fork(): only what a signal handler may do. Descriptors of sockets would keep connections.
 [[noreturn]] void become(const char* program, int recording, int output, int errors) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ::signal(SIGPIPE, SIG_DFL);
   ::setpriority(PRIO_PROCESS, 0, 19);
   const rlimit memory{kMostMemory, kMostMemory}, no_dump{0, 0}, file{kMostOutput, kMostOutput};
   ::setrlimit(RLIMIT_AS, &memory);

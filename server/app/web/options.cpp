@@ -7,6 +7,7 @@
 #include "common/base/version.h"
 #include "common/secure/loopback.h"
 #include "server/app/config/config_file.h"
+#include "server/app/config/log_options.h"
 
 namespace trocar::app {
 namespace {
@@ -89,7 +90,8 @@ CommandLine::CommandLine() {
                   "how links name this machine, if not by the address")
       ->type_name("HOST[:PORT]");
   app_.add_option("--recordings", options_.recordings_folder,
-                  "folder whose recordings may be watched [none]")
+                  "folder whose recordings may be watched, those named by letters, digits, ., _ "
+                  "and - [none]")
       ->type_name("DIR");
   app_.add_option("--page", options_.page_folder, "folder of the page's files [beside the program]")
       ->type_name("DIR");
@@ -101,23 +103,8 @@ CommandLine::CommandLine() {
       ->check(from_to(0, 1e9));
   app_.add_option("--ready-file", options_.ready_file, "write the port to this file when listening")
       ->type_name("FILE");
-  app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
-      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
-      ->type_name("LEVEL")
-      ->capture_default_str();
-  app_.add_option("--log-format", options_.log_format,
-                  "how it is said: text, or json: an object per line")
-      ->check(CLI::IsMember({"text", "json"}))
-      ->type_name("FORMAT")
-      ->capture_default_str();
-  auto* config = app_.set_config("--config", "",
-                                 "options from this file (TOML), each without its dashes; the "
-                                 "command line wins")
-                     ->type_name("FILE");
-  app_.add_flag("--check-config", options_.checks_config,
-                "check all options and files as a start would, and exit with 0 or 2")
-      ->needs(config)
-      ->configurable(false);
+  add_log_options(app_, options_.log_level, options_.log_format);
+  add_config_options(app_, options_.checks_config, "options and files");
   add_access_options();
   add_limit_options();
 }
@@ -178,6 +165,8 @@ Status CommandLine::finish() {
             parse_place("--metrics", metrics_, options_.metrics_address, options_.metrics_port);
         !s)
       return s;
+  if (options_.makes_new_key && options_.recordings_folder.empty())
+    return Error{ErrorCode::Usage, "--new-recordings-key: needs --recordings, whose links it ends"};
   options_.sessions.clear();
   for (const auto& text : sessions_) {
     bridge::SessionAddress session;

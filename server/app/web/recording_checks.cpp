@@ -7,6 +7,7 @@
 #include "common/base/exit_code.h"
 #include "common/base/json.h"
 #include "common/base/log.h"
+#include "common/base/own_folder.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/secure/private_files.h"
@@ -21,8 +22,7 @@ constexpr std::chrono::seconds kGrowing{5};
 constexpr std::size_t kMostText = 500;
 
 fs::path journal_program() {
-  std::error_code error;
-  return fs::read_symlink("/proc/self/exe", error).parent_path() / "trocar-journal";
+  return own_folder() / "trocar-journal";
 }
 
 std::string answer(const std::string& state, const std::string& text, const Json& tick = {}) {

@@ -6,12 +6,12 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 
 #include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "server/app/web/web_start.h"
 
@@ -37,7 +37,8 @@ Status run_web(const WebOptions& options) {
   if (!listening) return listening.error();
   auto& server = **listening;
   server.start();
-  asio::signal_set signals(context, SIGINT, SIGTERM);
+  asio::signal_set signals(context);
+  for (const int signal : ending_signals()) signals.add(signal);
   asio::steady_timer end(context), last(context);
   signals.async_wait([&](boost::system::error_code error, int) {
     if (!error) end_in_order(context, server, last);
@@ -94,5 +95,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::ignore_broken_pipes();
   return trocar::app::run(argc, argv);
 }

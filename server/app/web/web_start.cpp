@@ -4,13 +4,18 @@
 
 #include <array>
 #include <filesystem>
+#include <utility>
 
+#include "common/base/log.h"
+#include "common/base/own_folder.h"
 #include "common/base/printable.h"
+#include "common/base/writable.h"
 #include "common/secure/digest.h"
 #include "common/secure/kept_identity.h"
 #include "common/secure/link_file.h"
 #include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
+#include "server/session/monitoring/http_acceptor.h"
 
 namespace trocar::app {
 namespace {
@@ -27,10 +32,14 @@ Result<fs::path> state_folder(const WebOptions& options) {
 
 fs::path page_folder(const WebOptions& options) {
   if (!options.page_folder.empty()) return options.page_folder;
-  std::error_code error;
-  const auto program = fs::read_symlink("/proc/self/exe", error).parent_path().parent_path();
-  const auto installed = program / "share/trocar/web";
-  return fs::exists(installed, error) ? installed : program / "web/page";
+  std::error_code ignored;
+  const auto root = own_folder().parent_path();
+  const auto installed = root / "share/trocar/web";
+  return fs::exists(installed, ignored) ? installed : root / "web/page";
+}
+
+bool needs_state(const WebOptions& options) {
+  return !options.is_insecure || !options.recordings_folder.empty();
 }
 
 Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs::path& state) {
@@ -55,6 +64,25 @@ Result<std::string> read_or_make_key(const fs::path& state, bool makes_new) {
   return key;
 }
 
+// Says whether certificate and key can be read, or made in the folder of state.
+Status check_state(const WebOptions& options) {
+  const auto state = state_folder(options);
+  if (!state) return state.error();
+  if (needs_state(options))
+    if (const auto folder = secure::check_private_folder(*state); !folder)
+      return Error{folder.error().code, "--state: " + folder.error().message};
+  std::error_code ignored;
+  const bool is_made =
+      fs::exists(*state / "web.crt", ignored) && fs::exists(*state / "web.key", ignored);
+  if (!options.is_insecure && (is_made || !options.certificate_file.empty()))
+    if (const auto tls = read_certificate(options, *state); !tls) return tls.error();
+  if (options.recordings_folder.empty() || options.makes_new_key ||
+      !fs::exists(*state / kKeyFile, ignored))
+    return {};
+  const auto key = read_or_make_key(*state, false);
+  return key ? Status() : Status(key.error());
+}
+
 std::string link_head(const WebOptions& options, std::uint16_t port) {
   const std::string scheme = options.is_insecure ? "http://" : "https://";
   if (!options.public_name.empty()) return scheme + options.public_name + "/";
@@ -75,8 +103,7 @@ Result<WebStart> prepare_web(const WebOptions& options) {
   start.content.page = std::move(*page);
   const auto state = state_folder(options);
   if (!state) return state.error();
-  const bool needs_state = !options.is_insecure || !options.recordings_folder.empty();
-  if (needs_state)
+  if (needs_state(options))
     if (const auto made = secure::make_private_folder(*state); !made) return made.error();
   if (!options.is_insecure) {
     auto tls = read_certificate(options, *state);
@@ -88,6 +115,11 @@ Result<WebStart> prepare_web(const WebOptions& options) {
   if (!recordings) return recordings.error();
   auto key = read_or_make_key(*state, options.makes_new_key);
   if (!key) return key.error();
+  if (const auto names = recordings->left_out(); !names.empty())
+    log::warn(
+        "{}: {} recordings are not shown, {} among them: name them by letters, digits, ., _ "
+        "and - alone",
+        options.recordings_folder, names.size(), printable(names.front(), 80));
   start.content.recordings = std::move(*recordings);
   start.content.recordings_key = std::move(*key);
   start.content.state_folder = *state;
@@ -100,9 +132,14 @@ Status check_web_start(const WebOptions& options) {
   if (!options.recordings_folder.empty())
     if (const auto recordings = site::Recordings::open(options.recordings_folder); !recordings)
       return recordings.error();
-  if (options.certificate_file.empty()) return {};
-  const auto tls = read_certificate(options, {});
-  return tls ? Status() : Status(tls.error());
+  for (const auto& [option, address] :
+       {std::pair{"--listen", &options.address}, {"--metrics", &options.metrics_address}})
+    if (!address->empty())
+      if (const auto fine = monitoring::check_address(*address, option); !fine) return fine;
+  if (!options.ready_file.empty())
+    if (const auto ready = check_writable(options.ready_file); !ready)
+      return Error{ready.error().code, "--ready-file: " + ready.error().message};
+  return check_state(options);
 }
 
 std::string describe_links(const WebOptions& options, std::uint16_t port,

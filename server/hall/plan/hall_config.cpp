@@ -1,8 +1,11 @@
 #include "server/hall/plan/hall_config.h"
 
+#include "common/base/asio.h"  // before Boost: see there
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/asio/ip/address.hpp>
 #include <charconv>
 
 #include "common/lesson/lesson.h"
@@ -26,6 +29,12 @@ bool read_place(const std::string& text, std::string& address, std::uint16_t& po
   const char* end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data() + colon + 1, end, port);
   return !address.empty() && parsed.ec == std::errc{} && parsed.ptr == end;
+}
+
+bool is_address(const std::string& text) {
+  boost::system::error_code error;
+  asio::ip::make_address(text, error);
+  return !error;
 }
 
 void read_ports(tool::TableReader& table, const char* key, PortRange& range) {
@@ -64,7 +73,7 @@ Offer read_offer(tool::Document& document, const toml::table& at) {
 
 void read_access(tool::TableReader& table, HallConfig& config) {
   if (const auto listen = table.string("listen"))
-    if (!read_place(*listen, config.address, config.port))
+    if (!read_place(*listen, config.address, config.port) || !is_address(config.address))
       table.fail("listen", "is not ADDRESS:PORT, such as 127.0.0.1:7694");
   config.is_open_without_tls = table.boolean("open-without-tls").value_or(false);
   config.has_tls = table.boolean("tls").value_or(false);
@@ -89,7 +98,12 @@ void read_sessions(tool::TableReader& table, HallConfig& config, double machine_
   if (!table.has("recordings"))
     table.fail_missing("recordings", "write recordings = \"recordings\", a folder");
   config.state_folder = table.string("state").value_or("");
-  config.sessions_address = table.string("sessions-listen").value_or(config.sessions_address);
+  auto& address = config.sessions_address;
+  address = table.string("sessions-listen").value_or(address);
+  if (address.starts_with('[') && address.ends_with(']'))
+    address = address.substr(1, address.size() - 2);
+  if (!is_address(address))
+    table.fail("sessions-listen", "is no IPv4 or IPv6 address, such as 0.0.0.0");
   config.host = table.string("host").value_or("");
   read_ports(table, "ports", config.ports);
   read_ports(table, "figures-ports", config.figures_ports);

@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+
+#include "common/base/timing.h"
 
 namespace trocar::hall {
 namespace {
@@ -44,6 +47,11 @@ const char* name_of(SessionState state) {
       return "failed";
   }
   return "unknown";
+}
+
+double silence_s(const Session& session) {
+  if (session.state != SessionState::Running) return 0;
+  return std::max(0.0, static_cast<double>(monotonic_ns()) * 1e-9 - session.answered_at_s);
 }
 
 std::filesystem::path log_of(const SavedSession& session) {
@@ -101,6 +109,7 @@ Json describe(const Session& session, const HallConfig& config, bool is_trusted)
   json["tick_median_s"] = session.figures.tick_median_s;
   json["tick_p99_s"] = session.figures.tick_p99_s;
   json["slowest_stage_s"] = session.figures.slowest_stage_s;
+  json["silence_s"] = silence_s(session);
   json["cores"] = session.cores;
   json["peak_cores"] = session.peak_cores;
   json["restarts"] = session.restarts;

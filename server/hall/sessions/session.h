@@ -49,11 +49,15 @@ struct Session : SavedSession {
   ServerFigures figures;
   bool is_probed = false;  // its figures are being asked for
   double probe_at_s = 0, restart_at_s = 0, kill_at_s = 0, running_since_s = 0;
+  double answered_at_s = 0;  // its figures are of then
   // The window over which processor time is measured; begins at 0: there is none.
   double window_from_s = 0, window_processor_s = 0;
   bool has_acted = false;  // a tool, in this window
   double cores = 0;        // in the last window
 };
+
+// Returns for how many seconds a running session has not answered; 0 for one in another state.
+double silence_s(const Session& session);
 
 // Files in the session's folder.
 std::filesystem::path log_of(const SavedSession& session);

@@ -18,6 +18,7 @@
 #include "common/base/printable.h"
 #include "common/base/timing.h"
 #include "common/secure/link_file.h"
+#include "common/secure/private_files.h"
 #include "common/wire/role.h"
 #include "server/hall/sessions/figures_probe.h"
 
@@ -37,6 +38,7 @@ constexpr double kPeakStep = 0.05;      // cores; a smaller growth is not writte
 constexpr double kForgetting = 0.8;     // a kind of session that takes less now is believed slowly
 constexpr std::size_t kLogTail = 4096;  // bytes
 constexpr std::size_t kMostFailureText = 300;
+constexpr std::size_t kTrialBytes = 64 * 1024;
 constexpr std::size_t kMostOfferInName = 28;
 constexpr int kMostFolderTries = 10;
 
@@ -76,6 +78,17 @@ std::string last_words(const fs::path& log) {
   for (std::string line; std::getline(file, line);)
     if (!line.empty()) last = line;
   return printable(message_of(last), kMostFailureText);
+}
+
+// Says whether the folder of a recording still takes files. A server on a full disk can say
+// nothing: its log is on that disk.
+Status check_folder(const fs::path& folder) {
+  const auto trial = folder / "trial";
+  const auto written = secure::write_private_file(trial, std::string(kTrialBytes, ' '));
+  if (!written) return written;
+  std::error_code ignored;
+  fs::remove(trial, ignored);
+  return {};
 }
 
 bool has_content(const fs::path& file) {
@@ -122,6 +135,10 @@ Sessions::Sessions(asio::io_context& context, HallConfig config, fs::path progra
 void Sessions::take_over(SavedSession saved) {
   const auto session = std::make_shared<Session>();
   static_cast<SavedSession&>(*session) = std::move(saved);
+  // State files of before do not say it.
+  if (!session->offer.cores)
+    if (const auto* offer = config_.find_offer(session->offer.name))
+      session->offer.cores = offer->cores;
   session->server = ServerProcess::find(session->process, session->arguments);
   sessions_.push_back(session);
   if (session->server) {
@@ -233,7 +250,10 @@ Status Sessions::make_folder(Session& session) const {
 Status Sessions::launch(Session& session) {
   session.arguments = server_arguments(session, config_);
   auto started = ServerProcess::start(program_, session.arguments, log_of(session));
-  if (!started) return started.error();
+  if (!started) {
+    const auto fits = check_folder(session.folder);
+    return fits ? started.error() : fits.error();
+  }
   session.server.emplace(std::move(*started));
   session.process = session.server->id();
   session.figures = {};
@@ -343,7 +363,10 @@ void Sessions::on_ending(Session& session, const ServerProcess::Ending& ending) 
   if (session.state == SessionState::Ending || session.is_ending) return finish(session);
   if (ending.exit_code.value_or(-1) == 0 || (!ending.exit_code && is_in_order))
     return finish(session);
-  if (ending.exit_code) return fail(session, last_words(log_of(session)));
+  if (ending.exit_code) {
+    const auto fits = check_folder(session.folder);
+    return fail(session, fits ? last_words(log_of(session)) : fits.error().message);
+  }
   const auto why =
       ending.signal != 0 ? fmt::format("was killed by signal {}", ending.signal) : "has vanished";
   if (session.restarts >= config_.restarts)
@@ -396,6 +419,7 @@ asio::awaitable<void> Sessions::probe(std::shared_ptr<Session> session) {
   if (session->state == SessionState::Running) {
     const auto text = co_await get_page(context_, port, "/metrics");
     if (text && session->state == SessionState::Running && session->server && !is_stopping_) {
+      session->answered_at_s = now_s();
       session->figures = read_figures(*text);
       measure(*session);
     }
@@ -405,7 +429,7 @@ asio::awaitable<void> Sessions::probe(std::shared_ptr<Session> session) {
 
 void Sessions::become_running(Session& session) {
   session.state = SessionState::Running;
-  session.running_since_s = now_s();
+  session.running_since_s = session.answered_at_s = now_s();
   // Codes from before a restart are good still.
   if (session.codes.empty())
     for (const auto& role : wire::kRoles)

@@ -16,26 +16,28 @@ constexpr int kStateVersion = 1;
 constexpr std::size_t kMostSavedSessions = 256;
 
 Json to_json(const SavedSession& session) {
-  return {{"name", session.name},
-          {"start",
-           {{"name", session.offer.name},
-            {"lesson", session.offer.lesson},
-            {"organ", session.offer.organ},
-            {"workers", session.offer.workers},
-            {"bleeding", session.offer.bleeds}}},
-          {"folder", session.folder.string()},
-          {"port", session.port},
-          {"figures_port", session.figures_port},
-          {"recordings", session.recordings},
-          {"arguments", session.arguments},
-          {"pid", session.process.pid},
-          {"started_at", session.process.started_at},
-          {"restarts", session.restarts},
-          {"since_unix_s", session.since_unix_s},
-          {"codes", session.codes},
-          {"is_ending", session.is_ending},
-          {"peak_cores", session.peak_cores},
-          {"busy_windows", session.busy_windows}};
+  Json json{{"name", session.name},
+            {"start",
+             {{"name", session.offer.name},
+              {"lesson", session.offer.lesson},
+              {"organ", session.offer.organ},
+              {"workers", session.offer.workers},
+              {"bleeding", session.offer.bleeds}}},
+            {"folder", session.folder.string()},
+            {"port", session.port},
+            {"figures_port", session.figures_port},
+            {"recordings", session.recordings},
+            {"arguments", session.arguments},
+            {"pid", session.process.pid},
+            {"started_at", session.process.started_at},
+            {"restarts", session.restarts},
+            {"since_unix_s", session.since_unix_s},
+            {"codes", session.codes},
+            {"is_ending", session.is_ending},
+            {"peak_cores", session.peak_cores},
+            {"busy_windows", session.busy_windows}};
+  if (session.offer.cores) json["start"]["cores"] = *session.offer.cores;
+  return json;
 }
 
 // Throws what nlohmann::json and whole_number() throw.
@@ -48,6 +50,7 @@ SavedSession session_in(const Json& json) {
   session.offer.organ = offer.at("organ").get<std::string>();
   session.offer.workers = whole_number<unsigned>(offer, "workers");
   session.offer.bleeds = offer.at("bleeding").get<bool>();
+  if (offer.contains("cores")) session.offer.cores = offer.at("cores").get<double>();
   session.folder = json.at("folder").get<std::string>();
   session.port = whole_number<std::uint16_t>(json, "port");
   session.figures_port = whole_number<std::uint16_t>(json, "figures_port");
@@ -62,6 +65,7 @@ SavedSession session_in(const Json& json) {
   session.peak_cores = json.at("peak_cores").get<double>();
   session.busy_windows = whole_number<int>(json, "busy_windows");
   if (!is_name(session.name)) throw std::out_of_range("name is no name");
+  if (session.offer.cores.value_or(1) <= 0) throw std::out_of_range("cores is not above 0");
   return session;
 }
 
@@ -108,6 +112,12 @@ Result<StateFile> StateFile::open(const std::filesystem::path& folder) {
                folder.string() +
                    ": another trocar-hall uses this folder of state: end it first, "
                    "or name another folder with the key state"};
+}
+
+Status StateFile::check(const std::filesystem::path& folder) {
+  if (const auto fine = secure::check_private_folder(folder); !fine) return fine;
+  const auto read = StateFile(folder / "sessions.json", -1).read();
+  return read ? Status() : Status(read.error());
 }
 
 StateFile::StateFile(StateFile&& other) noexcept

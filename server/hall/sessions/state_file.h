@@ -28,6 +28,9 @@ class StateFile {
  public:
   // Takes the folder for this hall alone and makes it if it is missing. Error: another hall has it.
   static Result<StateFile> open(const std::filesystem::path& folder);
+  // Says whether open() and read() would succeed while no hall has the folder, without making
+  // anything.
+  static Status check(const std::filesystem::path& folder);
   StateFile(StateFile&& other) noexcept;
   StateFile& operator=(StateFile&&) = delete;
   ~StateFile();

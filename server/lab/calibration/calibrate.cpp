@@ -184,15 +184,23 @@ Status validate(const Settings& s) {
   const auto bad = [](const char* what) { return Error{ErrorCode::Usage, what}; };
   if (!(s.error >= 0.001 && s.error <= 0.5)) return bad("--error must be 0.1 to 50 %");
   if (s.places < 1 || s.places > 1000) return bad("--places must be 1 to 1000");
-  if (s.radius_m != 0 && !(s.radius_m >= kLeastRadius_m && s.radius_m <= kGreatestRadius_m))
+  if (s.radius_m && !(*s.radius_m >= kLeastRadius_m && *s.radius_m <= kGreatestRadius_m))
     return bad("--radius must be 0.5 to 50 mm");
   if (!(s.depth_m >= 0.001 && s.depth_m <= 0.05)) return bad("--depth must be 1 to 50 mm");
   if (s.first_nodes < 1 || !(s.first_n > 0)) return bad("the first range must not be empty");
   return {};
 }
 
+Status check_held(const organ::Organ& organ) {
+  if (!organ.fixed_nodes.empty()) return {};
+  return Error{ErrorCode::BadFile,
+               "organ '" + organ.name +
+                   "': nothing holds it, so a press moves all of it: import the mesh with a --fix "
+                   "rule"};
+}
+
 double radius_of(const organ::Organ& organ, const Settings& settings) {
-  if (settings.radius_m > 0) return settings.radius_m;
+  if (settings.radius_m) return *settings.radius_m;
   return std::clamp(kElements * surface_edge_m(organ), kLeastRadius_m, kGreatestRadius_m);
 }
 

@@ -7,6 +7,7 @@
 // largest over them. Deterministic for an organ and its settings.
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "server/lab/calibration/converged.h"
@@ -21,13 +22,15 @@ struct Settings {
   double reference_error = 0.1;
   std::size_t places = 16;
   std::uint64_t seed = 1;
-  double radius_m = 0;     // 0: 3.2 edges of the surface, within what a tool may have
-  double depth_m = 0.012;  // of the deepest press
-  double first_n = 0.125;  // upper end of the first range
+  std::optional<double> radius_m;  // nothing: 3.2 edges of the surface, as far as a tool may
+  double depth_m = 0.012;          // of the deepest press
+  double first_n = 0.125;          // upper end of the first range
   std::uint32_t first_nodes = 128;
   unsigned workers = 1;
 };
 Status validate(const Settings& settings);
+// Error (BadFile): nothing holds the organ, so a press moves all of it.
+Status check_held(const organ::Organ& organ);
 double radius_of(const organ::Organ& organ, const Settings& settings);
 
 // A finding is of one place and one range of force; it is for people.

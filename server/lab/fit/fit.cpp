@@ -12,6 +12,11 @@
 namespace trocar::fit {
 namespace {
 
+// A parameter that is changed by 1 (a bounded one) or doubled and changes the forces by less than
+// this share has no effect: it is less than solving leaves.
+constexpr double kNoEffect = 1e-5;
+constexpr double kLargeResidualPercent = 10;
+
 // Residuals and, by differences, their derivatives. A parameter is its value divided by where it
 // started, so that all are about 1, or the value itself if it is bounded.
 class Residuals final : public ceres::CostFunction {
@@ -38,17 +43,31 @@ class Residuals final : public ceres::CostFunction {
       residuals[i] = (forces[i] - measured_.points[i].force_n) / largest_n_;
     if (jacobians == nullptr || jacobians[0] == nullptr) return true;
     for (std::size_t k = 0; k < n; ++k) {
-      const auto& p = model_.parameters()[k];
-      auto shifted = x;
-      // Away from the upper bound, where materials are most sensitive.
-      const double step = p.is_bounded && x[k] + p.step > p.high ? -p.step : p.step;
-      shifted[k] += p.is_bounded ? step : step * x[k];
+      const auto shifted = shift(x, k);
       const auto other = run(shifted);
       if (other.empty()) return false;
       for (std::size_t i = 0; i < m; ++i)
         jacobians[0][i * n + k] = (other[i] - forces[i]) / largest_n_ / (shifted[k] - x[k]);
     }
     return true;
+  }
+
+  // The first parameter on which the forces do not depend where the fit starts. Costs no run, for
+  // the optimiser needs the same ones.
+  std::optional<std::size_t> without_effect() const {
+    const auto forces = run(starts_);
+    double largest = 0;
+    for (const double force : forces) largest = std::max(largest, std::abs(force));
+    for (std::size_t k = 0; k < starts_.size() && !forces.empty(); ++k) {
+      const auto shifted = shift(starts_, k);
+      const auto other = run(shifted);
+      double change = 0;
+      for (std::size_t i = 0; i < other.size(); ++i)
+        change = std::max(change, std::abs(other[i] - forces[i]));
+      if (!other.empty() && change <= kNoEffect * largest * std::abs(shifted[k] - starts_[k]))
+        return k;
+    }
+    return std::nullopt;
   }
 
   const std::vector<double>& starts() const { return starts_; }
@@ -62,6 +81,14 @@ class Residuals final : public ceres::CostFunction {
   }
 
  private:
+  // Returns x with one parameter changed, for a difference in its direction.
+  std::vector<double> shift(std::vector<double> x, std::size_t k) const {
+    const auto& p = model_.parameters()[k];
+    // Away from the upper bound, where materials are most sensitive.
+    const double step = p.is_bounded && x[k] + p.step > p.high ? -p.step : p.step;
+    x[k] += p.is_bounded ? step : step * x[k];
+    return x;
+  }
   std::vector<double> run(const std::vector<double>& x) const {
     // The optimiser comes back to values that it has tried.
     for (const auto& [tried, its_forces] : done_)
@@ -73,7 +100,7 @@ class Residuals final : public ceres::CostFunction {
     std::vector<FittedParameter> tried;
     for (std::size_t k = 0; k < x.size(); ++k)
       tried.push_back({std::string(model_.parameters()[k].key), starts_[k] * scales_[k],
-                       x[k] * scales_[k], std::nullopt});
+                       x[k] * scales_[k], std::nullopt, FittedParameter::Limit::None});
     double sum = 0;
     for (std::size_t i = 0; i < forces.size(); ++i)
       sum += (forces[i] - measured_.points[i].force_n) * (forces[i] - measured_.points[i].force_n);
@@ -109,7 +136,43 @@ void add_standard_errors(ceres::Problem& problem, const std::vector<double>& x, 
         std::sqrt(variance * matrix[k * n + k]) * residuals.scales()[k];
 }
 
+FittedParameter::Limit limit_at(const Tunable& tunable, double value) {
+  const auto is_near = [&](double limit) {
+    return std::abs(value - limit) <= 1e-3 * (tunable.is_bounded ? tunable.high : limit);
+  };
+  if (is_near(tunable.low)) return FittedParameter::Limit::Lower;
+  return is_near(tunable.high) ? FittedParameter::Limit::Upper : FittedParameter::Limit::None;
+}
+
 }  // namespace
+
+bool FittedParameter::is_determined() const {
+  return standard_error && 1.96 * *standard_error < std::abs(value);
+}
+
+std::vector<std::string> Fit::remarks() const {
+  std::vector<std::string> lines;
+  char line[200];
+  for (const auto& p : parameters) {
+    if (p.at != FittedParameter::Limit::None) {
+      std::snprintf(line, sizeof line,
+                    "%s ends at its %s limit, %.6g: look at the sign and the unit of the forces",
+                    p.key.c_str(), p.at == FittedParameter::Limit::Lower ? "lower" : "upper",
+                    p.value);
+      lines.emplace_back(line);
+    } else if (!p.is_determined() && forces_n.size() > parameters.size()) {
+      lines.push_back("the data do not tell " + p.key + ": measure more, or fit fewer parameters");
+    }
+  }
+  if (rms_percent > kLargeResidualPercent) {
+    std::snprintf(line, sizeof line,
+                  "the residual is %.3g %% of the largest measured force: this scenario and this "
+                  "material do not follow the curve",
+                  rms_percent);
+    lines.emplace_back(line);
+  }
+  return lines;
+}
 
 std::string fit_keys() {
   std::string keys;
@@ -125,6 +188,7 @@ Result<Fit> fit(const scenario::ResolvedScenario& resolved, const MeasuredCurve&
   Residuals residuals(*model, measured, progress);
   if (residuals.largest_n() == 0)
     return Error{ErrorCode::BadFile, measured.source.string() + ": all forces are 0"};
+  if (const auto k = residuals.without_effect()) return model->no_effect(*k);
   std::vector<double> x = residuals.starts();
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -157,7 +221,7 @@ Result<Fit> fit(const scenario::ResolvedScenario& resolved, const MeasuredCurve&
   for (std::size_t k = 0; k < x.size(); ++k)
     fit.parameters.push_back({std::string(model->parameters()[k].key),
                               residuals.starts()[k] * residuals.scales()[k], values[k],
-                              std::nullopt});
+                              std::nullopt, limit_at(model->parameters()[k], values[k])});
   auto last = model->run(values);
   fit.has_unconverged_steps = !last.is_converged;
   fit.forces_n = std::move(last.forces_n);
@@ -172,15 +236,19 @@ Result<Fit> fit(const scenario::ResolvedScenario& resolved, const MeasuredCurve&
 }
 
 std::string to_toml(const Fit& fit, const FitOptions& options) {
-  std::string text = options.region.empty() ? "[material]\n" : "[[region]]\n";
+  std::string text;
+  for (const auto& remark : fit.remarks()) text += "# Warning: " + remark + ".\n";
+  text += options.region.empty() ? "[material]\n" : "[[region]]\n";
   if (!options.region.empty()) text += "name = " + quote(options.region) + "\n";
   for (const auto& p : fit.parameters) {
     char line[120];
     std::snprintf(line, sizeof line, "%s = %.6g", p.key.c_str(), p.value);
     text += line;
-    if (p.standard_error) {
+    if (p.standard_error && p.is_determined()) {
       std::snprintf(line, sizeof line, "  # +- %.2g", *p.standard_error);
       text += line;
+    } else if (p.standard_error) {
+      text += "  # not determined";
     }
     text += "\n";
   }

@@ -32,6 +32,11 @@ struct FittedParameter {
   std::string key;
   double start = 0, value = 0;
   std::optional<double> standard_error;  // nothing if the data do not tell it from the others
+  enum class Limit { None, Lower, Upper };
+  Limit at = Limit::None;  // where the fit was stopped, because values end there
+
+  // Returns, as identify() does, whether 95 % of the chance lie within less than twice the value.
+  bool is_determined() const;
 };
 
 struct Fit {
@@ -42,19 +47,23 @@ struct Fit {
   bool is_converged = false;
   bool has_unconverged_steps = false;  // in the last run
   organ::Organ organ;                  // with the fitted material
+
+  // Returns what makes the result doubtful, a line each.
+  std::vector<std::string> remarks() const;
 };
 
 // The function hears after each run what was tried so far.
 using Progress =
     std::function<void(int run, const std::vector<FittedParameter>& tried, double rms_n)>;
 
-// Error: the scenario has no such curve, does not reach a measured displacement, or an unknown key.
+// Error: the scenario has no such curve, does not reach a measured displacement, an unknown key, or
+// one on which the curve does not depend.
 Result<Fit> fit(const scenario::ResolvedScenario& resolved, const MeasuredCurve& measured,
                 const FitOptions& options, const Progress& progress = {});
 
 // The keys that can be fitted, for messages and help.
 std::string fit_keys();
-// "[material]" and what was fitted, as a part of a scenario.
+// "[material]" and what was fitted, as a part of a scenario, after the remarks as comments.
 std::string to_toml(const Fit& fit, const FitOptions& options);
 
 }  // namespace trocar::fit

@@ -139,6 +139,26 @@ Status FitModel::choose_parameters(const FitOptions& options) {
   return {};
 }
 
+Error FitModel::no_effect(std::size_t parameter) const {
+  const auto& organ = resolved_.organ;
+  const std::string what =
+      "the curve does not depend on " + std::string(parameters_[parameter].key);
+  const auto map = organ::material_map(organ);
+  const auto& used = map.tets.empty() ? map.spring_pairs : map.tets;
+  const auto index = static_cast<std::uint16_t>(region_ ? *region_ + 1 : 0);
+  if (std::ranges::find(used, index) == used.end() && !region_) {
+    std::string names;
+    for (const auto& region : organ.regions) names += (names.empty() ? "" : ", ") + region.name;
+    return wrong(resolved_, what +
+                                " of the organ's own material: all tissue is in regions, say "
+                                "--region with one of " +
+                                names);
+  }
+  return wrong(resolved_, what + (region_ ? " of region " + organ.regions[*region_].name : "") +
+                              ": the probe does not feel it, so probe nearer, start from a larger "
+                              "value, or fit another parameter");
+}
+
 double FitModel::displacement_at(double time_s) const {
   const auto& scenario = resolved_.scenario;
   if (curve_.kind == scenario::LoadCurve::Kind::DisplacedSet)

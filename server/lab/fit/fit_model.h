@@ -28,6 +28,8 @@ class FitModel {
 
   const std::vector<Tunable>& parameters() const { return parameters_; }
   const material::Material& material() const { return material_of(resolved_.organ); }
+  // Returns what to say of a parameter on which the curve does not depend.
+  Error no_effect(std::size_t parameter) const;
   // The organ with these values.
   organ::Organ organ(std::span<const double> values) const;
 

@@ -16,8 +16,11 @@ template <typename Body>
 Status write_file(const std::filesystem::path& path, Body body) {
   const std::filesystem::path part = path.string() + ".part";
   const auto failed = [&] {
-    return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written (" +
-                                                 std::strerror(errno) + "), check the folder"};
+    const std::string why = std::strerror(errno);
+    std::error_code ignored;
+    std::filesystem::remove(part, ignored);
+    return Error{ErrorCode::ResourceMissing,
+                 path.string() + ": cannot be written (" + why + "), check the folder"};
   };
   std::FILE* file = std::fopen(part.c_str(), "wb");
   if (file == nullptr) return failed();

@@ -222,6 +222,19 @@ double ScenarioRun::time_s() const {
   return steps_done_ == 0 ? 0 : scenario().run.load_times_s[steps_done_ - 1];
 }
 
+std::size_t ScenarioRun::inverted_tets() const {
+  const auto& topology = simulation_.state().cuts.topology();
+  const auto at = [&](NodeIndex node) { return to_double(world().position(node)); };
+  std::size_t count = 0;
+  for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
+    if (!topology.has_tet(TetIndex(t))) continue;
+    const auto& [a, b, c, d] = topology.tet(TetIndex(t));
+    const Vec3d origin = at(a);
+    count += !(dot(cross(at(b) - origin, at(c) - origin), at(d) - origin) > 0);
+  }
+  return count;
+}
+
 bool ScenarioRun::is_due(std::size_t probe) const {
   return is_static() || steps_done_ % scenario().probes[probe].every_ticks == 0;
 }

@@ -75,6 +75,8 @@ class ScenarioRun {
     return to_double(
         simulation_.state().tools[ToolSlot{static_cast<std::uint8_t>(tool)}].pose.position);
   }
+  // How many tets are inside out now. O(tets).
+  std::size_t inverted_tets() const;
   // Whether the probe has a value for the last step.
   bool is_due(std::size_t probe) const;
   // After at least one step: m, m/s or N.

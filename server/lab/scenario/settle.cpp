@@ -51,10 +51,12 @@ Result<Settled> settle(organ::Organ organ, const Vec3d& gravity_m_s2,
   organ.source_offset_m += centre;
   organ.stress_free_positions_m = std::move(free);
   if (auto s = organ::validate(organ); !s)
-    return Error{ErrorCode::BadFile, name +
-                                         ": is too soft for this gravity, or held at too few "
-                                         "nodes: it hangs so far that " +
-                                         s.error().message};
+    return Error{ErrorCode::BadFile,
+                 name + ": is too soft for this gravity, or held at too few nodes" +
+                     (organ.material.elastic_law == material::ElasticLaw::Springs
+                          ? ", and springs fold first (neo-hookean tissue bears more)"
+                          : "") +
+                     ": it hangs so far that " + s.error().message};
   result.organ = std::move(organ);
   return result;
 }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
+#include <set>
 #include <variant>
 
 #include "server/organs/formats/mesh_file.h"
@@ -64,14 +66,34 @@ Result<int> nodes_of(const ImportOptions& options) {
   return nodes;
 }
 
-// The labels that are wanted, with the numbers and names that the map gives them.
 using Labels = std::vector<std::pair<std::uint16_t, std::string>>;
+
+// Error: a number or a name is there twice.
+Status check_distinct(const Labels& labels) {
+  std::set<std::uint16_t> numbers;
+  std::map<std::string, std::uint16_t> names;
+  for (const auto& [label, name] : labels) {
+    if (!numbers.insert(label).second)
+      return Error{ErrorCode::Usage,
+                   fmt::format("--labels: label {} is there twice: say it once", label)};
+    const auto [other, is_new] = names.try_emplace(name, label);
+    if (!is_new)
+      return Error{ErrorCode::Usage,
+                   fmt::format("--labels: {} and {} are both named '{}': say another name, such as "
+                               "{}:NAME",
+                               other->second, label, name, label)};
+  }
+  return {};
+}
+
+// The labels that are wanted, with the numbers and names that the map gives them.
 Result<Labels> find_labels(const Labels& wanted, const Labels& there, const std::string& file) {
   Labels labels;
   for (const auto& want : wanted.empty() ? there : wanted) {
     const auto& [label, name] = want;
-    const auto known = std::ranges::find_if(there, [&want](const auto& one) {
-      return want.first == 0 ? plain(one.second) == want.second : one.first == want.first;
+    const auto is_named_so = [&want](const auto& one) { return plain(one.second) == want.second; };
+    const auto known = std::ranges::find_if(there, [&](const auto& one) {
+      return want.first == 0 ? is_named_so(one) : one.first == want.first;
     });
     if (label == 0 && known == there.end()) {
       std::string text;
@@ -81,12 +103,19 @@ Result<Labels> find_labels(const Labels& wanted, const Labels& there, const std:
                                                  there.empty() ? "and names none: choose by number"
                                                                : "it has" + text)};
     }
+    if (label == 0 && std::ranges::count_if(there, is_named_so) > 1)
+      return Error{ErrorCode::Usage, fmt::format("--labels: {} has more than one label '{}': "
+                                                 "choose by number, such as {}:NAME",
+                                                 file, name, known->first)};
     const bool has_name = known != there.end() && name.empty();
     labels.emplace_back(label == 0 ? known->first : label, has_name ? plain(known->second)
                                                            : name.empty()
                                                                ? fmt::format("label {}", label)
                                                                : plain(name));
   }
+  // Names that the map itself gives twice are told apart later.
+  if (wanted.empty()) return labels;
+  if (auto s = check_distinct(labels); !s) return s.error();
   return labels;
 }
 
@@ -169,6 +198,30 @@ std::string names_of(const std::vector<mesh::NamedNodes>& sets) {
   return text;
 }
 
+// Gives each a name of its own; a warning says which got another. `what`: all of them.
+void make_distinct(std::vector<mesh::NamedNodes>& sets, const char* what,
+                   std::vector<std::string>& warnings) {
+  std::set<std::string> taken;
+  for (const auto& set : sets) taken.insert(plain(set.name));
+  std::map<std::string, int> count;  // of each name so far
+  std::string text;
+  for (auto& set : sets) {
+    const std::string name = plain(set.name);
+    int& nth = count[name];
+    ++nth;
+    if (nth == 1) continue;
+    const auto numbered = [&] { return fmt::format("{}-{}", name.substr(0, 180), nth); };
+    while (taken.contains(numbered())) ++nth;
+    set.name = numbered();
+    taken.insert(set.name);
+    if (text.size() < 200)
+      text += fmt::format("{}the next '{}' is '{}' here", text.empty() ? "" : ", ", name, set.name);
+    else if (!text.ends_with("..."))
+      text += ", ...";
+  }
+  if (!text.empty()) warnings.push_back(fmt::format("{} share a name, so {}", what, text));
+}
+
 // Regions of the organ's own material, for others to be given; an element belongs to the last
 // region that holds all of its nodes.
 Status add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
@@ -210,6 +263,8 @@ Result<ImportedOrgan> make_organ(mesh::ImportedMesh imported, const std::filesys
   if (auto warning = size_warning(organ.mesh, options.unit); !warning.empty())
     result.warnings.push_back(std::move(warning));
   organ.source_offset_m = imported.offset_m;
+  make_distinct(imported.regions, "regions", result.warnings);
+  make_distinct(imported.node_sets, "sets of nodes", result.warnings);
   if (auto s = add_regions(std::move(imported.regions), result); !s) return s.error();
   if (auto s = hold(options, imported.node_sets, result); !s) return s.error();
   organ.node_masses_kg = organ::lumped_masses(organ);
@@ -241,6 +296,12 @@ Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::str
       labels.emplace_back(std::uint16_t{0}, plain(std::string(part)));
       continue;
     }
+    if (colon + 1 == part.size())
+      return Error{
+          ErrorCode::Usage,
+          fmt::format("--labels: '{}' has no name behind its colon: say one, or the number "
+                      "alone",
+                      plain(std::string(part)))};
     int label = 0;
     const auto [end, error] = std::from_chars(part.data(), part.data() + colon, label);
     if (error != std::errc{} || end != part.data() + colon || label < 1 || label > 65535)

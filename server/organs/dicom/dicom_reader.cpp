@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bitset>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -16,11 +15,11 @@ namespace trocar::dicom {
 namespace {
 
 namespace fs = std::filesystem;
+using label_map::LabelCount;
 using label_map::LabelMap;
 
 constexpr std::size_t kMaxVoxels = std::size_t{256} << 20;
 constexpr std::size_t kMaxFiles = 4096;
-constexpr std::size_t kMaxSeriesLabels = 256;
 constexpr std::uint32_t kLazyBytes =
     4096;  // longer values stay in the file until they are asked for
 constexpr double kMax_mm = 1e6;
@@ -355,7 +354,7 @@ class SeriesReader {
           std::tuple{DCM_RescaleIntercept, "RescaleIntercept", 0.0}})
       if (double value = plain;
           reader.data().findAndGetFloat64(key, value).good() && value != plain)
-        return reader.error(fmt::format("{} is {}: {}", attribute, value, kNoLabels));
+        return reader.error(fmt::format("{} is {}: {}", attribute, value, label_map::kGreyValues));
     if (auto n = reader.whole(DCM_SamplesPerPixel, "SamplesPerPixel", 1, 1); !n) return n.error();
     const auto bits = reader.whole(DCM_BitsAllocated, "BitsAllocated", 8, 16);
     if (!bits) return bits.error();
@@ -371,26 +370,18 @@ class SeriesReader {
     auto* slice = map->labels.data() + size * static_cast<std::size_t>(grid.slice_of_places[i]);
     for (std::size_t k = 0; k < size; ++k) {
       const int label = *bits == 8 ? (*stored)[k] : (*stored)[2 * k] | (*stored)[2 * k + 1] << 8;
-      if (label > 0 && !seen_[static_cast<std::size_t>(label)]) {
-        seen_[static_cast<std::size_t>(label)] = true;
-        if (++labels_ > kMaxSeriesLabels)
-          return reader.error(
-              fmt::format("its pixels have more than {} values: {}", kMaxSeriesLabels, kNoLabels));
-      }
       slice[k] = static_cast<std::uint16_t>(label);
+      if (!labels_.add(slice[k])) return reader.error(LabelCount::error());
     }
     return {};
   }
 
-  static constexpr const char* kNoLabels =
-      "it holds grey values, not labels, so segment it first, in 3D Slicer for instance";
   fs::path folder_;
   std::vector<fs::path> files_;
   std::string series_;
   Plane plane_;
   std::vector<Vec3d> places_;  // by file
-  std::bitset<65536> seen_;
-  std::size_t labels_ = 0;
+  LabelCount labels_;          // of all files so far
 };
 
 }  // namespace

@@ -18,8 +18,7 @@ constexpr int kMostNames = 10'000;
 }  // namespace
 
 Status save(const organ::Organ& organ, const fs::path& path, Replace replace) {
-  if (path.extension() != ".organ")
-    return Error{ErrorCode::Usage, path.string() + ": the file's name must end with .organ"};
+  if (auto named = organ::check_organ_name(path); !named) return named;
   if (replace == Replace::Allow) return organ::write_organ(path, organ);
   // An empty file of that name keeps the name until the organ takes its place: no other program's
   // file of this moment is lost.

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "common/image/image.h"
 #include "common/wire/picture_size.h"
 #include "server/organs/surface/triangle_tree.h"
 
@@ -76,15 +77,37 @@ Error bad(const EmbedOptions& options, const std::string& what) {
   return {ErrorCode::BadFile, options.name + ": " + what};
 }
 
-Status check_picture(const EmbedOptions& options) {
-  if (options.picture.empty()) return {};
-  const auto size = wire::picture_size(options.picture);
-  if (!size) return bad(options, "the picture is neither PNG nor JPEG, or its header is broken");
+// Clients read the size from the header and unpack the rest: both are tried here. The picture is
+// within the limits of image::decode() once its header is.
+Status check_picture(const surface::RawSurface& raw, const EmbedOptions& options) {
+  const std::string& picture = options.picture;
+  if (picture.empty()) return {};
+  const bool is_own = options.picture_name.empty();
+  const auto refuse = [&](const std::string& what) {
+    return Error{ErrorCode::BadFile, (is_own ? options.name + ": its picture " + what
+                                             : options.picture_name + ": " + what)};
+  };
+  if (raw.corner_texture.empty())
+    return bad(options, "has no texture coordinates for " +
+                            (is_own ? "its picture" : "the picture " + options.picture_name));
+  if (picture.size() > wire::kMaxFinePictureBytes)
+    return refuse(fmt::format("has {} bytes, a picture may have {}: make it smaller",
+                              picture.size(), wire::kMaxFinePictureBytes));
+  const auto size = wire::picture_size(picture);
+  if (!size) return refuse("is neither PNG nor JPEG, or its header is broken");
   const auto [width, height] = *size;
-  if (std::min(width, height) > 0 && std::max(width, height) <= wire::kMostFinePictureSide)
+  if (std::min(width, height) == 0 || std::max(width, height) > wire::kMostFinePictureSide)
+    return refuse(fmt::format("has {} x {} pixels, may have 1 to {} along a side", width, height,
+                              wire::kMostFinePictureSide));
+  const auto decoded = image::decode(picture);
+  if (!decoded)
+    return refuse("cannot be unpacked (" + decoded.error().message +
+                  "): save it again as PNG or JPEG");
+  if (static_cast<std::size_t>(decoded->width) == width &&
+      static_cast<std::size_t>(decoded->height) == height)
     return {};
-  return bad(options, fmt::format("the picture has {} x {} pixels, may have 1 to {} along a side",
-                                  width, height, wire::kMostFinePictureSide));
+  return refuse(fmt::format("says {} x {} pixels and has {} x {}: save it again as PNG or JPEG",
+                            width, height, decoded->width, decoded->height));
 }
 
 // Turns from right, front and head or left, back and head to left, head and front, and back.
@@ -158,7 +181,7 @@ Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& 
     return bad(options, fmt::format("has {} triangles, a fine surface may have {}",
                                     raw.triangles.size(), wire::kMaxFineTriangles));
   if (!raw.texture_fault.empty()) return Error{ErrorCode::BadFile, raw.texture_fault};
-  if (Status fits = check_picture(options); !fits.ok()) return fits.error();
+  if (Status fits = check_picture(raw, options); !fits.ok()) return fits.error();
   EmbeddedFine result;
   result.surface.picture = options.picture;
   Vertices vertices(result.surface);
@@ -190,6 +213,11 @@ Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& 
   if (dropped > 0)
     result.warnings.push_back(fmt::format("dropped {} triangles without an area", dropped));
   if (result.surface.triangles.empty()) return bad(options, "has no triangles to embed");
+  if (result.surface.quanta.size() > wire::kMaxFineVertices)
+    return bad(options,
+               fmt::format("has {} vertices that differ in place or texture coordinates, a fine "
+                           "surface may have {}",
+                           result.surface.quanta.size(), wire::kMaxFineVertices));
   if (Status valid = wire::validate(result.surface); !valid.ok())
     return bad(options, valid.error().message);
   if (Status fits = fit(mesh, options, result); !fits.ok()) return fits.error();

@@ -33,7 +33,9 @@ struct EmbedOptions {
   surface::Axes axes = surface::Axes::Unsaid, organ_axes = surface::Axes::LeftHeadFront;
   Vec3d offset_m;       // of the organ's origin in the file's frame
   std::string picture;  // a PNG or JPEG file's bytes; empty: none
-  std::string name;     // it starts each error, usually the file's path
+  // It starts errors of the picture, usually the file's path; empty: the surface's file holds it.
+  std::string picture_name;
+  std::string name;  // it starts all other errors, usually the file's path
 };
 
 struct EmbeddedFine {
@@ -42,10 +44,10 @@ struct EmbeddedFine {
   std::vector<std::string> warnings;  // one line each
 };
 
-// `mesh`: the organ's, with its boundary. Error: more than kMostBeyond of the vertices are too
-// far away, or one by more than kMostEdgesBeyond, which names the place;
-// limits of wire::FineSurface; a picture larger than wire::kMostFinePictureSide, or whose header
-// does not tell its size; places in a picture that are wrong; there is nothing to embed.
+// `mesh`: the organ's, with its boundary. Error: more than kMostBeyond of the vertices are too far
+// away, or one by more than kMostEdgesBeyond, which names the place; limits of wire::FineSurface; a
+// picture larger than wire::kMostFinePictureSide, that cannot be unpacked, or for which there are
+// no texture coordinates; places in a picture that are wrong; there is nothing to embed.
 Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& mesh,
                            const EmbedOptions& options);
 

@@ -19,6 +19,8 @@ namespace trocar::formats {
 // The ends of names that are read, with their point and a comma between them.
 inline constexpr const char* kMeshEndings =
     ".msh, .vtk, .vtu, .node, .ele, .mesh, .inp, .stl, .obj, .ply, .glb";
+// Those of them that may hold a surface.
+inline constexpr const char* kSurfaceEndings = ".stl, .obj, .ply, .glb, .vtk";
 bool is_mesh_file(const std::filesystem::path& path);
 
 Result<TetsOrSurface> read_mesh_file(const std::filesystem::path& path);

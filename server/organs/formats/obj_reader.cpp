@@ -21,11 +21,13 @@ struct ObjFace {
   int line = 0;
 };
 
-// A number below 0 counts back from the last one there is. False: it is none.
-bool read_number(std::string_view word, std::size_t count, std::int64_t& number) {
-  if (!parse_whole(word, number) || number == 0) return false;
-  number = number > 0 ? number - 1 : static_cast<std::int64_t>(count) + number;
-  return true;
+// A number below 0 counts back from the last one there is. Empty, or what is wrong with it.
+std::string read_number(std::string_view word, std::size_t count, std::int64_t& number) {
+  if (!parse_whole(word, number) || number == 0) return "must be a whole number other than 0";
+  const auto there = static_cast<std::int64_t>(count);
+  if (number < -there) return std::to_string(count) + " come before it";
+  number = number > 0 ? number - 1 : there + number;
+  return {};
 }
 
 // "7", "7/1", "7//3" or "7/1/3"; numbers below 0 count back from the last vertex. What is wrong in
@@ -35,17 +37,18 @@ Status read_corner(const TextReader& in, std::string_view word, std::size_t vert
   std::int64_t number = 0;
   std::optional<std::int64_t> place;
   const auto slash = word.find('/');
-  if (!read_number(word.substr(0, slash), vertices, number))
+  if (const auto wrong = read_number(word.substr(0, slash), vertices, number); !wrong.empty())
     return in.error("face " + std::to_string(face_number) + " refers to vertex " + shown(word) +
-                    ", must be a whole number other than 0");
+                    ", " + wrong);
   if (slash != std::string_view::npos) {
     const auto rest = word.substr(slash + 1);
     const auto text = rest.substr(0, rest.find('/'));
-    if (std::int64_t read = 0; read_number(text, places, read))
-      place = read;
-    else if (!text.empty() && fault.empty())
+    std::int64_t read = 0;
+    const auto wrong = text.empty() ? std::string() : read_number(text, places, read);
+    if (!text.empty() && wrong.empty()) place = read;
+    if (!wrong.empty() && fault.empty())
       fault = in.error("face " + std::to_string(face_number) + " refers to texture coordinate " +
-                       shown(text) + ", must be a whole number other than 0")
+                       shown(text) + ", " + wrong)
                   .message;
   }
   face.corners.push_back(number);
@@ -64,27 +67,27 @@ void read_place(TextReader& in, std::vector<std::array<double, 2>>& places, std:
             .message;
 }
 
-// Gives each triangle its corners' places, if all faces have them and none is wrong.
-void add_texture(const std::vector<ObjFace>& faces,
+// Gives each triangle its corners' places, if all faces have them and none is wrong. cuts: of each
+// triangle in its face.
+void add_texture(const std::vector<ObjFace>& faces, const std::vector<PolygonCut>& cuts,
                  const std::vector<std::array<double, 2>>& places, const std::string& name,
                  surface::RawSurface& surface) {
   if (!surface.texture_fault.empty()) return;
   for (const ObjFace& face : faces)
     for (const auto& place : face.texture) {
       if (!place) return;
-      if (*place >= 0 && *place < static_cast<std::int64_t>(places.size())) continue;
+      if (*place < static_cast<std::int64_t>(places.size())) continue;
       surface.texture_fault = name + ":" + std::to_string(face.line) +
                               ": refers to texture coordinate " + std::to_string(*place + 1) +
                               ", the file has " + std::to_string(places.size());
       return;
     }
-  for (const ObjFace& face : faces)
-    for (std::size_t i = 2; i < face.texture.size(); ++i) {
-      const auto at = [&](std::size_t corner) {
-        return places[static_cast<std::size_t>(*face.texture[corner])];
-      };
-      surface.corner_texture.push_back({at(0), at(i - 1), at(i)});
-    }
+  for (std::size_t t = 0; t < cuts.size(); ++t) {
+    const ObjFace& face = faces[static_cast<std::size_t>(surface.face_numbers[t] - 1)];
+    auto& corners = surface.corner_texture.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k)
+      corners[k] = places[static_cast<std::size_t>(*face.texture[cuts[t][k]])];
+  }
 }
 
 }  // namespace
@@ -119,11 +122,12 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
     }
   }
   std::int64_t number = 0;
+  std::vector<PolygonCut> cuts;  // of each triangle, if there are places
   for (const ObjFace& face : faces)
-    if (auto s = add_polygon(face.corners, ++number, surface); !s)
+    if (auto s = add_polygon(face.corners, ++number, surface, places.empty() ? nullptr : &cuts); !s)
       return Error{ErrorCode::BadFile,
                    name + ":" + std::to_string(face.line) + ": " + s.error().message};
-  add_texture(faces, places, name, surface);
+  add_texture(faces, cuts, places, name, surface);
   return surface;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
 // Reader of the vertices and faces of Wavefront OBJ surfaces. Faces of more than three corners are
-// split around their first one. Materials, groups and normals are read over. Texture coordinates
+// cut into triangles (polygon.h). Materials, groups and normals are read over. Texture coordinates
 // that are wrong are left out, and RawSurface::texture_fault says so. Free-form curves and surfaces
 // are refused.
 //

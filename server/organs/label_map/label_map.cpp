@@ -21,6 +21,10 @@ std::string orientation_of(const std::array<Vec3d, 3>& steps) {
 
 }  // namespace
 
+std::string LabelCount::error() {
+  return "has more than " + std::to_string(kMaxLabels) + " values: " + kGreyValues;
+}
+
 Status set_place(const Vec3d& origin_m, const std::array<Vec3d, 3>& steps_m, LabelMap& map) {
   const auto error = [](const std::string& text) { return Error{ErrorCode::BadFile, text}; };
   if (!is_finite(origin_m) || !(length(origin_m) < kMaxOrigin_m))

@@ -3,6 +3,8 @@
 // A volume image whose numbers say to which structure each voxel belongs.
 
 #include <array>
+#include <bitset>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -40,6 +42,28 @@ struct LabelMap {
   double voxel_volume_m3() const {
     return length(steps_m[0]) * length(steps_m[1]) * length(steps_m[2]);
   }
+};
+
+// A volume with more values than this, beside 0, is a scan of grey values, and no label map.
+inline constexpr std::size_t kMaxLabels = 256;
+inline constexpr const char* kGreyValues =
+    "it holds grey values, not labels, so segment it first, in 3D Slicer for instance";
+
+// Tells label maps from scans by the number of values.
+class LabelCount {
+ public:
+  // False: there are more than kMaxLabels.
+  bool add(std::uint16_t label) {
+    if (label == 0 || seen_[label]) return true;
+    seen_[label] = true;
+    return ++count_ <= kMaxLabels;
+  }
+  // The error after that, without the file's name.
+  static std::string error();
+
+ private:
+  std::bitset<65536> seen_;
+  std::size_t count_ = 0;
 };
 
 // Sets origin, steps and orientation. Error, without the file's name: a value is not finite, a step

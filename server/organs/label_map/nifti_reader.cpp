@@ -22,6 +22,12 @@ constexpr StoredType kStoredTypes[] = {{2, 1, "uint8"},    {4, 2, "int16"},    {
                                        {16, 4, "float32"}, {64, 8, "float64"}, {256, 1, "int8"},
                                        {512, 2, "uint16"}, {768, 4, "uint32"}, {1024, 8, "int64"}};
 
+std::string stored_types() {
+  std::string text;
+  for (const auto& type : kStoredTypes) text += (text.empty() ? "" : ", ") + std::string(type.name);
+  return text;
+}
+
 Result<std::string> gunzip(std::string_view packed, const std::string& name) {
   std::string out;
   auto s = inflate_into(packed, Packing::Gzip, kMaxBytes, out);
@@ -87,7 +93,8 @@ class NiftiReader {
     const auto code = at<std::int16_t>(70);
     const auto type = std::ranges::find(kStoredTypes, code, &StoredType::code);
     if (type == std::end(kStoredTypes))
-      return error("datatype " + std::to_string(code) + " holds no labels: save whole numbers");
+      return error("datatype " + std::to_string(code) + " is not read: save it as one of " +
+                   stored_types());
     type_ = *type;
     const auto offset = at<float>(108);
     if (!(offset >= 348 && offset <= 1e6f) || offset != std::floor(offset))
@@ -192,6 +199,7 @@ class NiftiReader {
 
   Status read_labels() {
     map_.labels.resize(count_);
+    LabelCount labels;
     for (std::size_t i = 0; i < count_; ++i) {
       const double label = value(i);
       if (!(label >= 0 && label <= kMaxLabel && label == std::floor(label))) {
@@ -202,6 +210,7 @@ class NiftiReader {
                      ") is no label: labels are whole numbers from 0 to 65535");
       }
       map_.labels[i] = static_cast<std::uint16_t>(label);
+      if (!labels.add(map_.labels[i])) return error(LabelCount::error());
     }
     return {};
   }

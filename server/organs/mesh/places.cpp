@@ -13,6 +13,17 @@ namespace {
 constexpr double kMaxSize_m = 2.0;
 constexpr double kFar_m = 10;  // worth a warning: a body frame is nearer
 
+// Organs are 20 mm to 500 mm wide.
+const char* other_unit(double width) {
+  if (width > kMaxSize_m * 1000) return "scale it, or give the unit with --unit m, cm or mm";
+  if (width > 50)
+    return "if the file is in millimetres, import it with trocar-organ import --unit mm";
+  if (width > 20)
+    return "if the file is in millimetres or centimetres, import it with trocar-organ import "
+           "--unit mm or cm";
+  return "if the file is in centimetres, import it with trocar-organ import --unit cm";
+}
+
 }  // namespace
 
 Result<Centring> centre(std::span<Vec3d> positions, Unit unit, const std::string& things) {
@@ -20,13 +31,11 @@ Result<Centring> centre(std::span<Vec3d> positions, Unit unit, const std::string
   for (const Vec3d& p : positions) box.include(p);
   const Vec3d size = box.most - box.least;
   const double largest = std::max({size.x, size.y, size.z});
-  char text[160];
+  char text[200];
   if (largest > kMaxSize_m) {
-    const bool may_be_mm = unit == Unit::Metre && largest <= kMaxSize_m * 1000;
-    std::snprintf(
-        text, sizeof text, "is %.4g m wide, larger than 2 m: %s", largest,
-        may_be_mm ? "if the file is in millimetres, import it with trocar-organ import --unit mm"
-                  : "scale it, or give the unit with --unit m, cm or mm");
+    std::snprintf(text, sizeof text, "is %.4g m wide, larger than 2 m: %s", largest,
+                  unit == Unit::Metre ? other_unit(largest)
+                                      : "scale it, or give the unit with --unit m, cm or mm");
     return Error{ErrorCode::BadFile, text};
   }
   if (largest == 0) return Error{ErrorCode::BadFile, "all " + things + " are at the same place"};

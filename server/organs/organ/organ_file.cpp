@@ -295,7 +295,13 @@ Result<Organ> unpack_organ(BytesView file) {
   return organ;
 }
 
+Status check_organ_name(const std::filesystem::path& path) {
+  if (path.extension() == ".organ") return {};
+  return Error{ErrorCode::Usage, path.string() + ": the file's name must end with .organ"};
+}
+
 Status write_organ(const std::filesystem::path& path, const Organ& organ) {
+  if (auto s = check_organ_name(path); !s) return s;
   if (auto s = validate(organ); !s) return s;
   return write_packed(path, pack_organ(organ));
 }

@@ -20,6 +20,9 @@ namespace trocar::organ {
 Bytes encode_organ(const Organ& organ);
 Result<Organ> decode_organ(BytesView bytes);
 
+// Error: the name does not end with .organ. So an organ never takes the place of what it was made
+// from, such as a scan.
+Status check_organ_name(const std::filesystem::path& path);
 // Writes beside the path and renames, so that a file is whole or not there.
 Status write_organ(const std::filesystem::path& path, const Organ& organ);
 Result<Organ> read_organ(const std::filesystem::path& path);

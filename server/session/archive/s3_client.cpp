@@ -216,10 +216,22 @@ Error S3Client::refusal(const Request& request, const Answer& answer) const {
   const auto code = element_text(answer.body, "Code", from);
   from = 0;
   const auto message = element_text(answer.body, "Message", from);
-  return {ErrorCode::Refused,
-          fmt::format("{}/{}/{}: {} is answered with {}{}", place_.endpoint, place_.bucket,
-                      request.key, request.method, answer.status,
-                      code.empty() ? "" : printable(" " + code + ": " + message, kMostReason))};
+  // An answer to HEAD has no words, and storage says little to those whom it does not know.
+  const bool is_stranger = answer.status == 401 || answer.status == 403;
+  const bool is_elsewhere =
+      answer.status == 301 || answer.status == 307 || (answer.status == 400 && code.empty());
+  const auto advice =
+      is_stranger || is_elsewhere
+          ? fmt::format(
+                "; check AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, the region {} "
+                "(--region), and that the keys may use the bucket {}",
+                place_.region, place_.bucket)
+          : std::string();
+  return {
+      ErrorCode::Refused,
+      fmt::format("{}/{}/{}: {} is answered with {}{}{}", place_.endpoint, place_.bucket,
+                  request.key, request.method, answer.status,
+                  code.empty() ? "" : printable(" " + code + ": " + message, kMostReason), advice)};
 }
 
 std::string element_text(const std::string& xml, const std::string& name, std::size_t& from) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "common/base/printable.h"
@@ -289,6 +290,7 @@ Result<Assessment> assess(const std::string& path, const Options& options) {
   if (!session) return session.error();
   Assessment out;
   out.file = path;
+  out.name = std::filesystem::path(path).filename().string();
   const auto& first = session->parts.front().journal->info();
   for (const auto& part : session->parts)
     if (&part == &session->parts.back())

@@ -82,6 +82,7 @@ struct BloodCurve {
 
 struct Assessment {
   std::string file, organ;
+  std::string name;  // of the file, as reports and tables call it
   // A session that went on after a crash has earlier recordings, each from a tick on.
   struct Earlier {
     Tick begin = 0;

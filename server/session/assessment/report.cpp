@@ -197,7 +197,7 @@ Result<std::string> report_of(const Assessment& session, const std::vector<Stand
   const auto title = session.lesson ? session.lesson->title : "Session";
   std::string body = "<h1>" + html_text(title) + "</h1>\n";
   body += "<p>" + html_text(people_of(session)) + "<br><span class=\"small\">" +
-          html_text(fmt::format("{}, {} UTC, organ {}, {}", short_name(session.file),
+          html_text(fmt::format("{}, {} UTC, organ {}, {}", session.name,
                                 iso_time(session.start_utc_ns), session.organ,
                                 clock_of(session.whole.seconds()))) +
           "</span></p>\n";
@@ -275,8 +275,7 @@ Result<std::string> learning_report_of(const std::vector<Assessment>& sessions) 
         rows += "<tr>" + cell(people) + cell(std::to_string(i + 1), true) +
                 cell(iso_time(runs[i]->start_utc_ns)) +
                 cell(fmt::format("{:.0f}", runs[i]->points), true) +
-                cell(clock_of(runs[i]->whole.seconds()), true) + cell(short_name(runs[i]->file)) +
-                "</tr>\n";
+                cell(clock_of(runs[i]->whole.seconds()), true) + cell(runs[i]->name) + "</tr>\n";
       }
     }
     const auto svg = plot::to_svg(plot);

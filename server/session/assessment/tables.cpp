@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <set>
 
 #include "common/base/checksum.h"
@@ -95,10 +94,6 @@ std::string iso_time(std::uint64_t utc_ns) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(seconds));
 }
 
-std::string short_name(const std::string& file) {
-  return std::filesystem::path(file).filename().string();
-}
-
 std::vector<std::string> lines_of(const StrainDamage& strain) {
   std::vector<std::string> lines{fmt::format("{:.2f} ml of tissue were strained beyond {:.0f} %",
                                              strain.volume_m3 * 1e6, strain.limit * 100)};
@@ -126,7 +121,7 @@ std::string summary_of(const Assessment& session, const std::vector<Standing>& s
   };
   std::string out;
   const auto line = [&](const std::string& text) { out += text + "\n"; };
-  line(fmt::format("{}: {}, {:.1f} s", short_name(session.file),
+  line(fmt::format("{}: {}, {:.1f} s", session.name,
                    session.lesson ? session.lesson->title : "no lesson", session.whole.seconds()));
   if (session.lesson)
     line(fmt::format(
@@ -169,8 +164,7 @@ std::string csv_of(const std::vector<Assessment>& sessions) {
     const auto title = session.lesson ? session.lesson->title : "";
     const auto add = [&](const std::string& stage, const std::string& person,
                          const std::string& tool, const std::string& key, double value) {
-      out += fmt::format("{},{},{},{},{},{},{},{:.9g}\n",
-                         recording::csv_text(short_name(session.file)),
+      out += fmt::format("{},{},{},{},{},{},{},{:.9g}\n", recording::csv_text(session.name),
                          iso_time(session.start_utc_ns), recording::csv_text(title),
                          recording::csv_text(stage), recording::csv_text(person), tool, key, value);
     };
@@ -200,7 +194,7 @@ std::string csv_of(const std::vector<Assessment>& sessions) {
 }
 
 std::string json_of(const Assessment& session, const std::vector<Standing>& standings) {
-  Json json = {{"file", short_name(session.file)},
+  Json json = {{"file", session.name},
                {"start", iso_time(session.start_utc_ns)},
                {"organ", session.organ},
                {"lesson", session.lesson ? Json(session.lesson->title) : Json()},

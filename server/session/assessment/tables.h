@@ -12,8 +12,6 @@ namespace trocar::assessment {
 
 // Returns "2026-11-27T14:03:20Z".
 std::string iso_time(std::uint64_t utc_ns);
-// Returns a file's name without its folder.
-std::string short_name(const std::string& file);
 
 // "12.3 ml of tissue were strained beyond 30 %, ...", a line each.
 std::vector<std::string> lines_of(const StrainDamage& strain);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "common/budget/message_budget.h"
@@ -74,7 +75,9 @@ bool take_out_words(proto::TeachEvent& event, bool keeps_words) {
 
 class Anonymiser {
  public:
-  explicit Anonymiser(bool keeps_words) : keeps_words_(keeps_words) {}
+  // path: of the recording, for messages.
+  Anonymiser(std::string path, bool keeps_words)
+      : path_(std::move(path)), keeps_words_(keeps_words) {}
 
   // Names are known before the first text is changed: a list may follow a sentence.
   Status collect(journal::McapReader& reader) {
@@ -132,9 +135,11 @@ class Anonymiser {
     // A newer program may have written names into fields that are not known here.
     message_->DiscardUnknownFields();
     if (is_read) return {};
-    return Error{ErrorCode::BadFile, channel.topic + ": holds a message that cannot be decoded"};
+    return Error{ErrorCode::BadFile,
+                 path_ + ": " + channel.topic + ": holds a message that cannot be decoded"};
   }
 
+  std::string path_;
   bool keeps_words_;
   Pseudonyms pseudonyms_;
   std::unique_ptr<Message> message_;
@@ -154,12 +159,8 @@ Result<AnonymiseReport> anonymise(const std::string& from, const std::string& to
         from + ": is cut short or damaged: trocar-journal repair makes a whole file of it"};
   };
   if (!(*opened)->is_finished()) return damaged();
-  Anonymiser anonymiser(keeps_words);
-  const auto named = [&](const Error& error) {
-    return Error{error.code,
-                 error.message.starts_with("/") ? from + ": " + error.message : error.message};
-  };
-  if (auto collected = anonymiser.collect(**opened); !collected) return named(collected.error());
+  Anonymiser anonymiser(from, keeps_words);
+  if (auto collected = anonymiser.collect(**opened); !collected) return collected.error();
   const journal::McapMetadata note{kAnonymisedMetadataName,
                                    {{"people", std::to_string(anonymiser.people())},
                                     {"words", keeps_words ? "kept" : "taken out"}}};
@@ -169,7 +170,7 @@ Result<AnonymiseReport> anonymise(const std::string& from, const std::string& to
         return anonymiser.change(channel, message);
       },
       note);
-  if (!copied) return named(copied.error());
+  if (!copied) return copied.error();
   return AnonymiseReport{anonymiser.people(), anonymiser.words()};
 }
 

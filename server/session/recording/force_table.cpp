@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -13,6 +12,7 @@
 #include "common/wire/hand_report_messages.h"
 #include "server/session/recording/csv_text.h"
 #include "server/session/recording/hand_moments.h"
+#include "server/session/recording/table_file.h"
 
 namespace trocar::recording {
 namespace {
@@ -85,8 +85,8 @@ Result<ForceTableCounts> write_force_table(const std::string& journal, const std
       });
   if (!read_lists) return read_lists.error();
 
-  std::ofstream out(table);
-  out << kHeader;
+  TableFile out("--forces", table);
+  out.write(kHeader);
   const auto read_frames =
       (*session)->read_frame_states(0, kAll, [&](Tick tick, const proto::FrameState& state) {
         std::string rows;
@@ -97,13 +97,10 @@ Result<ForceTableCounts> write_force_table(const std::string& journal, const std
           counts.felt += felt.has_value();
           add_row(tick, tool, name_at(lists, tick, tool.tool() / kToolsPerHand), felt, rows);
         }
-        out << rows;
-        return out.good();
+        return out.write(rows);
       });
-  out.close();
-  if (!out)
-    return Error{ErrorCode::ResourceMissing,
-                 "--forces: " + table + ": cannot be written; does the folder exist?"};
+  // Damage is told when everything else is in the table.
+  if (auto written = out.finish(); !written) return written.error();
   if (!read_frames) return read_frames.error();
   return counts;
 }

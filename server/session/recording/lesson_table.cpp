@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <limits>
 
 #include "common/journal/session_journal.h"
 #include "server/session/recording/csv_text.h"
+#include "server/session/recording/table_file.h"
 #include "server/session/replication/validation.h"
 
 namespace trocar::recording {
@@ -48,20 +48,17 @@ Result<LessonTableCounts> write_lesson_table(const std::string& journal, const s
   auto session = journal::SessionJournal::open(journal);
   if (!session) return session.error();
   LessonTableCounts counts;
-  std::ofstream out(table);
-  out << kLessonHeader;
+  TableFile out("--lesson", table);
+  out.write(kLessonHeader);
   const auto read = (*session)->read_lessons(0, std::numeric_limits<Tick>::max(),
                                              [&](Tick tick, const proto::LessonRecord& record) {
                                                const auto row = row_of(tick, record);
                                                counts.left_out += record.left_out();
                                                counts.rows += row.empty() ? 0 : 1;
-                                               out << row;
-                                               return out.good();
+                                               return out.write(row);
                                              });
-  out.close();
-  if (!out)
-    return Error{ErrorCode::ResourceMissing,
-                 "--lesson: " + table + ": cannot be written; does the folder exist?"};
+  // Damage is told when everything else is in the table.
+  if (auto written = out.finish(); !written) return written.error();
   if (!read) return read.error();
   return counts;
 }

@@ -1,14 +1,8 @@
 #include "server/session/recording/session_copy.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <charconv>
-#include <cstdio>
-#include <cstring>
-#include <filesystem>
 #include <limits>
 #include <utility>
 
@@ -20,29 +14,9 @@
 namespace trocar::recording {
 namespace {
 
-namespace fs = std::filesystem;
 using journal::JournalTopic;
 
 constexpr std::string_view kToolTopic = "/tool/";
-
-Error exists(const std::string& path) {
-  return {ErrorCode::Usage, path + ": exists already, no recording is overwritten"};
-}
-
-// Gives the file its name; a file of that name stays as it is.
-Status rename_to_new(const std::string& from, const std::string& to) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return {};
-  int failed = errno;
-  // A file system that cannot do that in one step takes two.
-  if (failed == EINVAL || failed == ENOSYS) {
-    std::error_code ignored;
-    if (fs::exists(to, ignored)) return exists(to);
-    if (::rename(from.c_str(), to.c_str()) == 0) return {};
-    failed = errno;
-  }
-  if (failed == EEXIST) return exists(to);
-  return Error{ErrorCode::ResourceMissing, to + ": " + std::strerror(failed)};
-}
 
 // "1.20" of a file.
 bool parse_protocol(const std::string& text, std::uint32_t& major, std::uint32_t& minor) {
@@ -57,8 +31,7 @@ bool parse_protocol(const std::string& text, std::uint32_t& major, std::uint32_t
 
 Result<std::unique_ptr<SessionCopy>> SessionCopy::create(const std::string& to,
                                                          const journal::SessionInfo& session) {
-  std::error_code ignored;
-  if (fs::exists(to, ignored)) return exists(to);
+  if (auto is_free = UnfinishedFile::refuse_existing(to); !is_free) return is_free.error();
   journal::SessionDescription description{.start_utc_ns = session.start_utc_ns,
                                           .sim_version = session.sim_version,
                                           .organ_name = session.organ_name,
@@ -73,7 +46,7 @@ Result<std::unique_ptr<SessionCopy>> SessionCopy::create(const std::string& to,
       !parse_protocol(session.protocol, description.protocol_major, description.protocol_minor))
     return Error{ErrorCode::BadFile,
                  to + ": the recording does not say when it began, or with which protocol"};
-  const auto temporary = to + ".part-" + std::to_string(::getpid());
+  const auto temporary = UnfinishedFile::name_for(to);
   auto writer = journal::SessionJournalWriter::create(temporary, description);
   if (!writer) return writer.error();
   return std::unique_ptr<SessionCopy>(new SessionCopy(to, temporary, std::move(*writer),
@@ -84,18 +57,14 @@ SessionCopy::SessionCopy(std::string to, std::string temporary,
                          std::unique_ptr<journal::SessionJournalWriter> writer,
                          std::uint64_t start_utc_ns, Tick begin)
     : to_(std::move(to)),
-      temporary_(std::move(temporary)),
+      file_(std::move(temporary)),
       writer_(std::move(writer)),
       overview_(begin),
       begin_(begin),
       last_tick_(begin),
       most_ticks_((std::numeric_limits<std::uint64_t>::max() - start_utc_ns) / kTickNanoseconds) {}
 
-SessionCopy::~SessionCopy() {
-  writer_.reset();
-  std::error_code ignored;
-  if (!temporary_.empty()) fs::remove(temporary_, ignored);
-}
+SessionCopy::~SessionCopy() = default;
 
 Status SessionCopy::write_metadata(const journal::McapMetadata& metadata) {
   return writer_->write_metadata(metadata);
@@ -163,12 +132,10 @@ Status SessionCopy::finish(const journal::McapMetadata& note) {
   if (auto noted = writer_->write_metadata(note); !noted) return noted;
   if (auto closed = writer_->close(); !closed) return closed;
   if (auto read =
-          read_back(temporary_, {.messages = messages_, .begin = begin_, .end = last_tick_});
+          read_back(file_.path(), {.messages = messages_, .begin = begin_, .end = last_tick_});
       !read)
     return read;
-  if (auto named = rename_to_new(temporary_, to_); !named) return named;
-  temporary_.clear();
-  return {};
+  return file_.rename_to_new(to_);
 }
 
 }  // namespace trocar::recording

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "common/base/result.h"
+#include "common/base/unfinished_file.h"
 #include "common/journal/mcap_reader.h"
 #include "common/journal/session_journal.h"
 #include "common/journal/session_journal_writer.h"
@@ -24,8 +25,7 @@ class SessionCopy {
   // `to` must not exist. session: as SessionJournal read it from what is copied.
   static Result<std::unique_ptr<SessionCopy>> create(const std::string& to,
                                                      const journal::SessionInfo& session);
-  // Removes what was not finished.
-  ~SessionCopy();
+  ~SessionCopy();  // removes what was not finished
   SessionCopy(const SessionCopy&) = delete;
   SessionCopy& operator=(const SessionCopy&) = delete;
 
@@ -51,7 +51,8 @@ class SessionCopy {
   Status write_overview(const std::optional<proto::Overview>& overview,
                         std::uint64_t publish_time_ns);
 
-  std::string to_, temporary_;
+  std::string to_;
+  UnfinishedFile file_;
   std::unique_ptr<journal::SessionJournalWriter> writer_;
   RecordedOverview overview_;
   std::set<std::pair<std::string, journal::StringMap>> noted_;

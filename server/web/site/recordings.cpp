@@ -14,6 +14,7 @@ namespace trocar::site {
 namespace {
 
 constexpr std::size_t kMostNameBytes = 128;
+constexpr std::string_view kEnding = ".mcap";
 
 bool is_regular(int folder, const char* name, struct stat& status) {
   return ::fstatat(folder, name, &status, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(status.st_mode);
@@ -22,7 +23,6 @@ bool is_regular(int folder, const char* name, struct stat& status) {
 }  // namespace
 
 bool is_recording_name(std::string_view name) {
-  constexpr std::string_view kEnding = ".mcap";
   if (name.size() <= kEnding.size() || name.size() > kMostNameBytes || !name.ends_with(kEnding) ||
       name.front() == '.')
     return false;
@@ -69,21 +69,37 @@ Recordings::~Recordings() {
   if (folder_ >= 0) ::close(folder_);
 }
 
+void Recordings::for_each_file(
+    const std::function<void(const char*, const struct stat&)>& visit) const {
+  const int again = ::openat(folder_, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  DIR* folder = again >= 0 ? ::fdopendir(again) : nullptr;
+  if (folder == nullptr) return;
+  while (const auto* entry = ::readdir(folder)) {
+    struct stat status {};
+    if (is_regular(folder_, entry->d_name, status)) visit(entry->d_name, status);
+  }
+  ::closedir(folder);
+}
+
+std::vector<std::string> Recordings::left_out() const {
+  std::vector<std::string> names;
+  for_each_file([&](const char* name, const struct stat&) {
+    if (std::string_view(name).ends_with(kEnding) && !is_recording_name(name))
+      names.emplace_back(name);
+  });
+  std::ranges::sort(names);
+  return names;
+}
+
 std::string Recordings::list() const {
   struct Entry {
     std::string name;
     std::int64_t bytes = 0, changed = 0;
   };
   std::vector<Entry> entries;
-  const int again = ::openat(folder_, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (DIR* folder = again >= 0 ? ::fdopendir(again) : nullptr) {
-    while (const auto* entry = ::readdir(folder)) {
-      struct stat status {};
-      if (is_recording_name(entry->d_name) && is_regular(folder_, entry->d_name, status))
-        entries.push_back({entry->d_name, status.st_size, status.st_mtim.tv_sec});
-    }
-    ::closedir(folder);
-  }
+  for_each_file([&](const char* name, const struct stat& status) {
+    if (is_recording_name(name)) entries.push_back({name, status.st_size, status.st_mtim.tv_sec});
+  });
   std::ranges::sort(entries, [](const Entry& a, const Entry& b) {
     return a.changed != b.changed ? a.changed > b.changed : a.name < b.name;
   });

@@ -3,11 +3,15 @@
 // The recordings of one folder. Only regular files in it count, by names of letters, digits and
 // ._- that end in .mcap: no name leads out of the folder, and no symbolic link is followed.
 
+#include <sys/stat.h>
+
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/result.h"
 
@@ -46,6 +50,8 @@ class Recordings {
   Recordings& operator=(Recordings&& other) noexcept;
   ~Recordings();
 
+  // Files that end in .mcap and are not shown because of their names, sorted.
+  std::vector<std::string> left_out() const;
   // A JSON array of name, bytes and time of last change (seconds since 1970): the newest first, at
   // most kMostListed.
   std::string list() const;
@@ -53,6 +59,7 @@ class Recordings {
   std::unique_ptr<OpenRecording> find(std::string_view name) const;
 
  private:
+  void for_each_file(const std::function<void(const char*, const struct stat&)>& visit) const;
   Recordings(int folder, std::filesystem::path path) : folder_(folder), path_(std::move(path)) {}
 
   int folder_ = -1;

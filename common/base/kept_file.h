@@ -1,0 +1,14 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace trocar {
+
+// Error: there is a recording or an organ of this name, which the output of an option would
+// replace. `option`: what named the output, such as "--summary".
+Status refuse_to_replace_kept(const std::string& option, const std::filesystem::path& path);
+
+}  // namespace trocar

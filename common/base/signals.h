@@ -1,0 +1,20 @@
+#pragma once
+
+// Signals of programs that run for long and end in order.
+
+#include <vector>
+
+namespace trocar {
+
+// Writing where nobody reads any more is an error of that write from now on, not the end of the
+// program (SIGPIPE). Programs that this one starts inherit it.
+void ignore_broken_pipes();
+
+// Returns the signals that ask for an end in order: SIGINT, SIGTERM and SIGHUP, which comes when
+// the terminal is closed. SIGHUP is not among them if it is ignored, as nohup has it.
+std::vector<int> ending_signals();
+
+// Returns how people know one of them: "Ctrl-C", "SIGTERM" or "SIGHUP".
+const char* name_of_signal(int signal);
+
+}  // namespace trocar
