@@ -20,7 +20,6 @@
 #include "common/base/kept_file.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
-#include "common/base/writable.h"
 #include "common/secure/link_file.h"
 #include "common/secure/loopback.h"
 #include "common/tool/script.h"
@@ -369,11 +368,8 @@ Status check_end(const ClientOptions& options) {
   for (const auto& [key, file] : {std::pair{"--screenshot", &options.screenshot_file},
                                   {"--summary", &options.summary_file},
                                   {"--hand-trace", &options.trace_file}})
-    if (!file->empty()) {
-      if (auto kept = refuse_to_replace_kept(key, *file); !kept) return kept;
-      if (const auto s = check_writable(*file); !s)
-        return Error{s.error().code, std::string(key) + ": " + s.error().message};
-    }
+    if (!file->empty())
+      if (auto fine = check_output(key, *file); !fine) return fine;
   return {};
 }
 

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <string_view>
 
+#include "common/base/writable.h"
+
 namespace trocar {
 
 Status refuse_to_replace_kept(const std::string& option, const std::filesystem::path& path) {
@@ -17,6 +19,13 @@ Status refuse_to_replace_kept(const std::string& option, const std::filesystem::
   return Error{ErrorCode::Usage, option + ": " + path.string() + " is " +
                                      (is_recording ? "a recording" : "an organ") +
                                      ", which would be lost: choose another name"};
+}
+
+Status check_output(const std::string& option, const std::filesystem::path& path) {
+  if (auto kept = refuse_to_replace_kept(option, path); !kept) return kept;
+  const auto writable = check_writable(path);
+  return writable ? writable
+                  : Status(Error{writable.error().code, option + ": " + writable.error().message});
 }
 
 }  // namespace trocar

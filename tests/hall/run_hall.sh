@@ -52,16 +52,19 @@ lattice='[[offer]]
 name = "lattice"
 organ = "lattice"
 cores = 0.4'
-start_hall() { # OPTION...
-  rm -f ready
-  "$bin/trocar-hall" --config hall.toml --ready-file ready "$@" 2>>hall.log &
-  hall=$!
+await_hall() {
   for _ in $(seq 200); do
     [ -s ready ] && break
     kill -0 $hall 2>/dev/null || fail "the hall does not start"
     sleep 0.05
   done
   at=127.0.0.1:$(cat ready)
+}
+start_hall() { # OPTION...
+  rm -f ready
+  "$bin/trocar-hall" --config hall.toml --ready-file ready "$@" 2>>hall.log &
+  hall=$!
+  await_hall
 }
 needs_client() {
   [ -x "$bin/trocar-client" ] && return
@@ -355,12 +358,7 @@ test_full() {
   unshare -rm bash -c 'mount -t tmpfs -o size=64k small recordings && { cat /dev/zero >recordings/all 2>/dev/null || true; } &&
     exec "$0" --config hall.toml --ready-file ready' "$bin/trocar-hall" 2>>hall.log &
   hall=$!
-  for _ in $(seq 200); do
-    [ -s ready ] && break
-    kill -0 $hall 2>/dev/null || fail "the hall does not start"
-    sleep 0.05
-  done
-  at=127.0.0.1:$(cat ready)
+  await_hall
   code=0
   "$bin/trocar-hall" start lattice --at "$at" --key hall.key >said 2>&1 || code=$?
   [ $code = 4 ] && grep -q 'recordings/.*cannot be written (No space left' said || fail "$code, $(cat said)"

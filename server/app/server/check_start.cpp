@@ -46,9 +46,7 @@ Status check_end(const ServerOptions& options) {
       if (fs::path(*file).lexically_normal() == fs::path(options.journal).lexically_normal())
         return Error{ErrorCode::Usage,
                      std::string(key) + ": " + *file + " is --journal, too: choose another name"};
-      if (auto kept = refuse_to_replace_kept(key, *file); !kept) return kept;
-      if (const auto s = check_writable(*file); !s)
-        return Error{s.error().code, std::string(key) + ": " + s.error().message};
+      if (auto fine = check_output(key, *file); !fine) return fine;
     }
   return {};
 }

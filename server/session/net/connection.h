@@ -10,7 +10,7 @@
 //
 // While Draining the peer's bytes are read and thrown away: closing a socket with unread bytes
 // makes the kernel send a reset, and the peer could lose the last words that are on their way.
-// Where writing fails, what the peer had said before it went is read to its end.
+// The reader takes what the peer had said before it went to its end, also where writing fails.
 
 #include "common/base/asio.h"  // before Boost: see there
 
