@@ -1,20 +1,34 @@
-# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [SANITIZED] [ALONE] [APART]
-#              [TOGETHER])
-# A GoogleTest program; each of its tests becomes one ctest test. SANITIZED: deploy/test runs it a second
-# time with address and undefined-behaviour sanitizers; for what reads outside data. ALONE: no other
-# test runs beside it; for sessions in real time. Its sources are compiled together, a dozen at a time,
-# because their headers take longest. APART: one by one, where they define the same names. TOGETHER: the
-# program is one ctest test, because its tests share what takes long to make.
+# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [READS path...] [COST seconds]
+#              [TIMEOUT seconds] [SANITIZED] [ALONE] [APART] [CAMPAIGN])
+# A GoogleTest program. deploy/test runs all its tests in one process, or in several parts if they take long,
+# so what several of them need (an organ, a reduction) is made once. READS: files and folders of the
+# repository that they open. COST: about how long all of them take, on one core. SANITIZED: deploy/test runs
+# it a second time with address and undefined-behaviour sanitizers; for what reads outside data. ALONE: no
+# other test runs beside it; for what measures time. CAMPAIGN: takes long, so only deploy/campaign runs it.
+# Its sources are compiled together, a dozen at a time, because their headers take longest. APART: one by one,
+# where they define the same names.
+#
+# script_test(<name> COMMAND program argument... [PROGRAMS target...] [READS path...] [AFTER test...]
+#             [ENVIRONMENT NAME=value...] [COST seconds] [TIMEOUT seconds] [SKIP_CODE n] [ALONE] [WEB] [CAMPAIGN])
+# A script that is one test. PROGRAMS: what it starts, or takes from the build folder. AFTER: tests that leave
+# what this one begins with. SKIP_CODE: its exit code, if not 77, where something is missing that it needs.
+# WEB: needs the page for browsers; deploy/test --with-web runs it.
+#
+# Both are ctest tests, too.
 add_custom_target(sanitized_tests)
+
 function(project_test name)
-  cmake_parse_arguments(ARG "SANITIZED;ALONE;APART;TOGETHER" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
-  if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 300)
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "SANITIZED;ALONE;APART;CAMPAIGN" "TIMEOUT;COST" "SOURCES;DEPENDS;LINK;READS")
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "project_test(${name}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
   endif()
   add_executable(${name} ${ARG_SOURCES})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
   if(NOT ARG_APART)
     set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+  endif()
+  if(ARG_CAMPAIGN)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
   endif()
   target_link_libraries(${name} PRIVATE trocar_options GTest::gtest_main ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)
@@ -24,22 +38,68 @@ function(project_test name)
   use_precompiled_headers(${name} test ${ARG_DEPENDS})
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
-  set(labels)
-  set(alone)
-  if(ARG_ALONE)
-    set(alone RUN_SERIAL TRUE)
-  endif()
   if(ARG_SANITIZED)
-    set(labels LABELS sanitized)
     add_dependencies(sanitized_tests ${name})
   endif()
-  set(properties TIMEOUT ${ARG_TIMEOUT} ${labels} ${alone}
-    # Servers that tests start keep certificate and codes out of the user's folders.
-    ENVIRONMENT "XDG_STATE_HOME=${PROJECT_BINARY_DIR}/state")
-  if(ARG_TOGETHER)
-    add_test(NAME ${name} COMMAND ${name})
-    set_tests_properties(${name} PROPERTIES ${properties})
-  else()
-    gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+  # Servers that tests start keep certificate and codes out of the user's folders.
+  list_test(${name} gtest "$<TARGET_FILE:${name}>" "${name}" "XDG_STATE_HOME=${PROJECT_BINARY_DIR}/state" "")
+endfunction()
+
+function(script_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "ALONE;WEB;CAMPAIGN" "TIMEOUT;COST;SKIP_CODE"
+    "COMMAND;PROGRAMS;READS;AFTER;ENVIRONMENT")
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "script_test(${name}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
+  endif()
+  # It is made of the folder that names it.
+  file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
+  list(APPEND ARG_READS ${folder})
+  if(TARGET web_page AND ARG_WEB)
+    list(APPEND ARG_PROGRAMS web_page)
+  endif()
+  list_test(${name} script "${ARG_COMMAND}" "${ARG_PROGRAMS}" "${ARG_ENVIRONMENT}" "${ARG_AFTER}")
+endfunction()
+
+# list_test(<name> <kind> <command> <targets> <environment> <after>): what both have in common, once as a line
+# for tests.json and once for ctest. Takes the other ARG_ variables of its caller.
+function(list_test name kind command targets environment after)
+  foreach(default IN ITEMS TIMEOUT:300 COST:1 SKIP_CODE:77)
+    string(REPLACE ":" ";" default ${default})
+    list(GET default 0 variable)
+    if(NOT DEFINED ARG_${variable})
+      list(GET default 1 ARG_${variable})
+    endif()
+  endforeach()
+  set(part "")
+  if(ARG_CAMPAIGN)
+    set(part "campaign")
+  elseif(ARG_WEB)
+    set(part "web")
+  endif()
+  foreach(variable IN ITEMS ALONE SANITIZED)
+    set(${variable} false)
+    if(ARG_${variable})
+      set(${variable} true)
+    endif()
+  endforeach()
+  set(pairs)
+  foreach(entry IN LISTS environment)
+    string(REGEX REPLACE "^([^=]+)=(.*)$" "\"\\1\": \"\\2\"" pair "${entry}")
+    list(APPEND pairs "${pair}")
+  endforeach()
+  list(JOIN pairs ", " pairs)
+  foreach(variable IN ITEMS command targets after ARG_READS)
+    json_array(${variable} ${${variable}})
+  endforeach()
+  set_property(GLOBAL APPEND PROPERTY TROCAR_TEST_LINES "{\"name\": \"${name}\", \"kind\": \"${kind}\", \
+\"command\": ${command_json}, \"targets\": ${targets_json}, \"reads\": ${ARG_READS_json}, \"after\": ${after_json}, \
+\"environment\": {${pairs}}, \"timeout\": ${ARG_TIMEOUT}, \"cost\": ${ARG_COST}, \"skip_code\": ${ARG_SKIP_CODE}, \
+\"alone\": ${ALONE}, \"part\": \"${part}\", \"sanitized\": ${SANITIZED}}")
+
+  add_test(NAME ${name} COMMAND ${command})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 3600 RUN_SERIAL ${ALONE} SKIP_RETURN_CODE ${ARG_SKIP_CODE}
+    ENVIRONMENT "${environment}" LABELS "${part}")
+  if(after)
+    set_tests_properties(${name} PROPERTIES DEPENDS "${after}")
   endif()
 endfunction()

@@ -117,4 +117,5 @@ template <typename... Parts> void warn(const Parts&...) {}
             -Wl,-z,stack-size=262144 ${objects} -o "${module}"
     DEPENDS ${objects} COMMENT "Linking ${name}.wasm" VERBATIM)
   add_custom_target(${name} DEPENDS "${module}")
+  set_target_properties(${name} PROPERTIES TROCAR_FILES "${ARG_SOURCES}")
 endfunction()
