@@ -14,7 +14,6 @@ fail() {
 
 # Objects may be shared between checkouts of the same sources.
 export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$root} CCACHE_NOHASHDIR=1
-export NINJA_STATUS='[%f/%t %es] '
 
 # need_value OPTION "$@"-rest: fails unless the option is followed by a value.
 need_value() {
@@ -37,13 +36,13 @@ absolute() {
   esac
 }
 
-# All programs, as deploy/build and deploy/demo build them.
-all_programs=(trocar-server trocar-hall trocar-client trocar-organ trocar-organ-edit trocar-sim trocar-journal trocar-impair
-  trocar-web trocar-doctor)
+# All programs, as deploy/build and deploy/package build them.
+all_programs=(trocar-server trocar-hall trocar-relay trocar-client trocar-organ trocar-organ-edit trocar-sim trocar-journal
+  trocar-impair trocar-web trocar-doctor)
 
-# build PRESET [TARGET...]: configures if needed and builds. Tests are there if the script sets
-# with_tests=true, after deploy/setup --with-tests; the page for browsers if its tools are there, which a
-# script looks for again with with_web=true.
+# build PRESET [TARGET...]: configures if needed and builds. The lines that say how far it is begin with
+# $building. Tests are there if the script sets with_tests=true, after deploy/setup --with-tests; the page
+# for browsers if its tools are there, which a script looks for again with with_web=true.
 build() {
   local preset=$1 tests=OFF
   shift
@@ -58,5 +57,5 @@ build() {
     }
     rm -f "$root/build-$preset.log"
   fi
-  ninja -C "$root/build/$preset" "$@"
+  python3 "$root/deploy/lib/build.py" --what "${building:-Building}" "$root/build/$preset" "$@"
 }

@@ -126,7 +126,7 @@ check_options() {
   done
   for program in deploy/*; do
     [ -f "$program" ] && [ -x "$program" ] || continue
-    bash "$program" --help | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
+    "./$program" --help | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
   # Of cmake, systemctl, podman and bench_crowd.
   printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"

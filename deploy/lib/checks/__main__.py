@@ -10,6 +10,8 @@ import sys
 import time
 from pathlib import Path
 
+import build as ninja  # deploy/lib/build.py
+
 from . import report
 from .plan import Plan, Test, changed_files
 from .progress import Progress, minutes
@@ -106,9 +108,9 @@ class Check:
         build = ROOT / "build" / preset
         cache = build / "CMakeCache.txt"
         lines = cache.read_text() if cache.exists() else ""
-        ninja = (build / "build.ninja").read_text() if (build / "build.ninja").exists() else ""
-        wants_page = self.options.with_web and preset == "release" and "web_page" not in ninja
-        if not ninja or "TROCAR_TESTS:BOOL=ON" not in lines or wants_page or not (build / "tests.json").exists():
+        rules = (build / "build.ninja").read_text() if (build / "build.ninja").exists() else ""
+        wants_page = self.options.with_web and preset == "release" and "web_page" not in rules
+        if not rules or "TROCAR_TESTS:BOOL=ON" not in lines or wants_page or not (build / "tests.json").exists():
             done = subprocess.run(["cmake", "--preset", preset, "-DTROCAR_TESTS=ON"], cwd=ROOT, capture_output=True,
                                   text=True)
             if done.returncode:
@@ -123,7 +125,7 @@ class Check:
     def build(self, preset: str, targets: list[str]) -> None:
         build = ROOT / "build" / preset
         before = len(report.ninja_log(build))
-        if subprocess.run(["ninja", "-C", str(build), *targets]).returncode:
+        if not ninja.run(build, targets, f"Building {preset}"):
             self.failures.append(f"build {preset}")
             self.finish()
         self.passed += 1
@@ -282,7 +284,8 @@ def main() -> None:
         try:
             check.changed = changed_files(ROOT, options.changed)
         except ValueError as error:
-            sys.exit(f"deploy/test: --changed {options.changed}: {error}")
+            print(f"deploy/test: --changed {options.changed}: {error}", file=sys.stderr)
+            sys.exit(2)
     if not options.filter and not options.campaign:
         check.format()
     check.release()
