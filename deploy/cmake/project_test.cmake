@@ -1,10 +1,11 @@
 # project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [READS path...] [COST seconds]
-#              [TIMEOUT seconds] [SANITIZED] [ALONE] [APART] [CAMPAIGN])
+#              [TIMEOUT seconds] [READER | SANITIZED] [ALONE] [APART] [CAMPAIGN])
 # A GoogleTest program. deploy/test runs all its tests in one process, or in several parts if they take long,
 # so what several of them need (an organ, a reduction) is made once. READS: files and folders of the
-# repository that they open. COST: about how long all of them take, on one core. SANITIZED: deploy/test runs
-# it a second time with address and undefined-behaviour sanitizers; for what reads outside data. ALONE: no
-# other test runs beside it; for what measures time. CAMPAIGN: takes long, so only deploy/campaign runs it.
+# repository that they open. COST: about how long all of them take, on one core. READER: it tests what
+# reads or decodes outside data, so deploy/test --with-clang runs it a second time with address and
+# undefined-behaviour sanitizers. SANITIZED: deploy/campaign sanitized does, as for readers. ALONE: no other test
+# runs beside it; for what measures time. CAMPAIGN: takes long, so only deploy/campaign runs it.
 # Its sources are compiled together, a dozen at a time, because their headers take longest. APART: one by one,
 # where they define the same names.
 #
@@ -18,7 +19,7 @@
 add_custom_target(sanitized_tests)
 
 function(project_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "SANITIZED;ALONE;APART;CAMPAIGN" "TIMEOUT;COST" "SOURCES;DEPENDS;LINK;READS")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "READER;SANITIZED;ALONE;APART;CAMPAIGN" "TIMEOUT;COST" "SOURCES;DEPENDS;LINK;READS")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "project_test(${name}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
   endif()
@@ -38,7 +39,7 @@ function(project_test name)
   use_precompiled_headers(${name} test ${ARG_DEPENDS})
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
-  if(ARG_SANITIZED)
+  if(ARG_READER OR ARG_SANITIZED)
     add_dependencies(sanitized_tests ${name})
   endif()
   # Servers that tests start keep certificate and codes out of the user's folders.
@@ -76,12 +77,16 @@ function(list_test name kind command targets environment after)
   elseif(ARG_WEB)
     set(part "web")
   endif()
-  foreach(variable IN ITEMS ALONE SANITIZED)
-    set(${variable} false)
-    if(ARG_${variable})
-      set(${variable} true)
-    endif()
-  endforeach()
+  set(alone false)
+  if(ARG_ALONE)
+    set(alone true)
+  endif()
+  set(sanitized "")
+  if(ARG_READER)
+    set(sanitized "change")
+  elseif(ARG_SANITIZED)
+    set(sanitized "campaign")
+  endif()
   set(pairs)
   foreach(entry IN LISTS environment)
     string(REGEX REPLACE "^([^=]+)=(.*)$" "\"\\1\": \"\\2\"" pair "${entry}")
@@ -94,10 +99,10 @@ function(list_test name kind command targets environment after)
   set_property(GLOBAL APPEND PROPERTY TROCAR_TEST_LINES "{\"name\": \"${name}\", \"kind\": \"${kind}\", \
 \"command\": ${command_json}, \"targets\": ${targets_json}, \"reads\": ${ARG_READS_json}, \"after\": ${after_json}, \
 \"environment\": {${pairs}}, \"timeout\": ${ARG_TIMEOUT}, \"cost\": ${ARG_COST}, \"skip_code\": ${ARG_SKIP_CODE}, \
-\"alone\": ${ALONE}, \"part\": \"${part}\", \"sanitized\": ${SANITIZED}}")
+\"alone\": ${alone}, \"part\": \"${part}\", \"sanitized\": \"${sanitized}\"}")
 
   add_test(NAME ${name} COMMAND ${command})
-  set_tests_properties(${name} PROPERTIES TIMEOUT 3600 RUN_SERIAL ${ALONE} SKIP_RETURN_CODE ${ARG_SKIP_CODE}
+  set_tests_properties(${name} PROPERTIES TIMEOUT 3600 RUN_SERIAL ${alone} SKIP_RETURN_CODE ${ARG_SKIP_CODE}
     ENVIRONMENT "${environment}" LABELS "${part}")
   if(after)
     set_tests_properties(${name} PROPERTIES DEPENDS "${after}")

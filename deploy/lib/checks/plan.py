@@ -32,7 +32,7 @@ class Test:
     skip_code: int = 77
     alone: bool = False  # nothing else runs beside it
     part: str = ""  # "web": only deploy/test --with-web runs it; "campaign": only deploy/campaign
-    sanitized: bool = False  # is run a second time with sanitizers
+    sanitized: str = ""  # is run a second time with sanitizers: with every "change", or in a "campaign"
 
 
 class Plan:
@@ -141,7 +141,7 @@ def changed_files(root: Path, base: str) -> list[str]:
     def lines(*command: str) -> list[str]:
         done = subprocess.run(["git", "-C", str(root), *command], capture_output=True, text=True)
         if done.returncode:
-            raise ValueError(done.stderr.strip().splitlines()[-1])
+            raise ValueError(done.stderr.strip().splitlines()[0])
         return done.stdout.splitlines()
 
     names = lines("diff", "--name-only", "--no-renames", base)
