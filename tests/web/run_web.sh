@@ -44,13 +44,13 @@ record() {
 case $test in
   recording) record ;;
   hour)
-    chromium=$(command -v chromium) || skip "Chromium is not installed: deploy/setup --with-web"
+    chromium=$(command -v chromium) || skip "Chromium is not installed: deploy/setup --with-tests --with-web"
     export TROCAR_CHROMIUM=$chromium TROCAR_HOUR=$work/hour.mcap
     "$bin/trocar-sim" "$here/hour.toml" --journal "$TROCAR_HOUR" --out "$work/hour"
     node "$here/hour.mjs"
     ;;
   firefox)
-    firefox=$(command -v firefox-esr || command -v firefox) || skip "Firefox is not installed: deploy/setup --with-web"
+    firefox=$(command -v firefox-esr || command -v firefox) || skip "Firefox is not installed: deploy/setup --with-tests --with-web"
     command -v Xvfb >/dev/null || skip "Firefox draws in a window alone: deploy/setup --with-tests installs xvfb"
     export TROCAR_FIREFOX=$firefox
     Xvfb -displayfd 1 -screen 0 1400x900x24 -nolisten tcp >"$work/display" 2>"$work/xvfb.log" &
@@ -63,7 +63,7 @@ case $test in
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
   page | lesson | blood | fine | debrief | access | hostile | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
-      skip "Chromium is not installed: deploy/setup --with-web"
+      skip "Chromium is not installed: deploy/setup --with-tests --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"
     export TROCAR_CHROMIUM=$chromium
     if [ "$test" != figures ]; then
