@@ -45,11 +45,17 @@ function(project_library folder)
 endfunction()
 
 # project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...
-#                 [JOINED]): one executable in build/<preset>/bin. DEPENDS names the folders that its
-# files include. JOINED: its files are compiled together.
+#                 [JOINED] [ON_DEMAND]): one executable in build/<preset>/bin. DEPENDS names the folders
+# that its files include. JOINED: its files are compiled together. ON_DEMAND: a build makes it only when it
+# is named; for what measures or writes. All of these together are the target on_demand.
+add_custom_target(on_demand)
 function(project_program name)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "JOINED" "ABOUT" "MAIN;DEPENDS;LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "JOINED;ON_DEMAND" "ABOUT" "MAIN;DEPENDS;LINK")
   add_executable(${name} ${ARG_MAIN})
+  if(ARG_ON_DEMAND)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL TRUE)
+    add_dependencies(on_demand ${name})
+  endif()
   if(ARG_JOINED OR TROCAR_UNITY)
     set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
   endif()

@@ -63,7 +63,8 @@ TEST(Architecture, TheTableOfFoldersIsUpToDate) {
   std::ifstream file(std::filesystem::path(TROCAR_SOURCE_DIR) / "docs/folders.md");
   const std::string committed{std::istreambuf_iterator<char>(file), {}};
   EXPECT_EQ(committed, folder_table(tree()))
-      << "write it again: build/release/bin/folder_table > docs/folders.md";
+      << "write it again: ninja -C build/release folder_table && build/release/bin/folder_table > "
+         "docs/folders.md";
 }
 TEST(Architecture, FilesAreShortAndBelongToNoMachine) {
   expect_none(check_files(tree()));

@@ -1,7 +1,8 @@
 #pragma once
 
 // docs/folders.md: every folder of the layer list with its purpose, from the CMake files alone.
-// After a change of either: build/release/bin/folder_table > docs/folders.md
+// After a change of either: ninja -C build/release folder_table, then
+//   build/release/bin/folder_table > docs/folders.md
 
 #include <string>
 

@@ -49,8 +49,9 @@ std::vector<std::string> words_of_cmake(const std::string& text) {
 }
 
 Folder read_folder(const std::string& cmake_text) {
-  static const std::set<std::string> kKeywords{"ABOUT", "SOURCES", "HEADERS", "DEPENDS", "USES",
-                                               "LINK",  "MAIN",    "JOINED",  "APART"};
+  static const std::set<std::string> kKeywords{"ABOUT", "SOURCES",  "HEADERS", "DEPENDS",
+                                               "USES",  "LINK",     "MAIN",    "JOINED",
+                                               "APART", "ON_DEMAND"};
   Folder folder;
   std::string command, keyword;
   const auto words = words_of_cmake(cmake_text);

@@ -1,5 +1,6 @@
 // write_seeds DIR: the seeds that are not text, one file per decoder, made from small sound data.
-// Run after a change of a format: build/release/bin/write_seeds tests/fuzz/seeds
+// Run after a change of a format:
+//   ninja -C build/release write_seeds && build/release/bin/write_seeds tests/fuzz/seeds
 
 #include <cstdio>
 #include <filesystem>

@@ -14,8 +14,9 @@ import build as ninja  # deploy/lib/build.py
 
 from . import report
 from .plan import Plan, Test, changed_files
-from .progress import Progress, minutes
+from .progress import minutes
 from .runner import Job, Runner, make_jobs
+from .suite import Suite
 
 ROOT = Path(__file__).resolve().parents[3]
 FUZZ_SECONDS = 3  # for each reader of outside data; deploy/campaign fuzz gives them minutes
@@ -154,17 +155,10 @@ class Check:
             if self.options.filter:
                 self.failures.append(f"no test's name matches '{self.options.filter}'")
             return
-        count = sum(len(job.names) for job in jobs)
-        workers = os.cpu_count() or 1
-        progress = Progress(count, sum(job.cost for job in jobs), workers)
-        print(f"{count:,} tests in {len(jobs)} processes, about {minutes(progress.seconds_left(time.monotonic()))}",
-              flush=True)
-        self.runner = Runner(workers, progress)
-        began = time.monotonic()
-        self.runner.run(jobs)
-        print(f"{progress.ended:,} tests in {minutes(time.monotonic() - began)}", flush=True)
+        suite = Suite(jobs)
+        self.runner = suite.runner
+        suite.run(self.out / f"{preset}.xml")
         self.count(jobs)
-        report.write_junit(self.out / f"{preset}.xml", jobs)
         report.write_times(self.out / f"{preset}-times.tsv", jobs)
         if preset == "release":
             self.slowest = report.slowest(jobs)
@@ -172,7 +166,7 @@ class Check:
     def count(self, jobs: list[Job]) -> None:
         for job in jobs:
             for result in job.results:
-                name = result.name if job.test.kind == "script" else f"{job.test.name}.{result.name}"
+                name = report.full_name(job, result)
                 if result.outcome == "passed":
                     self.passed += 1
                 elif result.outcome == "skipped":

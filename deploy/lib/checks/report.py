@@ -5,11 +5,16 @@ import subprocess
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-from .runner import Job
+from .runner import Job, Result
 
 SLOWEST_TESTS = 40
 SLOWEST_PROGRAMS = 10
 LONGEST_OUTPUTS = 10
+
+
+def full_name(job: Job, result: Result) -> str:
+    """program.Suite.Test, or the name of a script."""
+    return result.name if job.test.kind == "script" else f"{job.test.name}.{result.name}"
 
 
 def write_junit(path: Path, jobs: list[Job]) -> None:
@@ -18,7 +23,7 @@ def write_junit(path: Path, jobs: list[Job]) -> None:
     for job in jobs:
         suite = suites.setdefault(job.test.name, xml.SubElement(root, "testsuite", name=job.test.name))
         for result in job.results:
-            case = xml.SubElement(suite, "testcase", classname=job.test.name, name=result.name,
+            case = xml.SubElement(suite, "testcase", classname=job.test.name, name=full_name(job, result),
                                   time=f"{result.seconds:.3f}")
             if result.outcome != "passed":
                 kind = "failure" if result.outcome == "failed" else "skipped"
@@ -33,19 +38,19 @@ def _printable(text: str) -> str:
 
 def write_times(path: Path, jobs: list[Job]) -> None:
     """Every test with its seconds, and every process with those of the processor."""
-    rows = ["program\ttest\twall_s\tprogram_cpu_s"]
+    rows = ["test\twall_s\tprocess_cpu_s"]
     for job in jobs:
         for result in job.results:
-            rows.append(f"{job.test.name}\t{result.name}\t{result.seconds:.3f}\t{job.cpu_seconds:.2f}")
+            rows.append(f"{full_name(job, result)}\t{result.seconds:.3f}\t{job.cpu_seconds:.2f}")
     path.write_text("\n".join(rows) + "\n")
 
 
 def slowest(jobs: list[Job]) -> list[str]:
     """Lines: the tests that took longest, and the programs that used the processor longest."""
-    results = [(result.seconds, job.test.name, result.name) for job in jobs for result in job.results]
+    results = [(result.seconds, full_name(job, result)) for job in jobs for result in job.results]
     lines = [f"The slowest {SLOWEST_TESTS} tests:"]
-    for seconds, program, name in sorted(results, reverse=True)[:SLOWEST_TESTS]:
-        lines.append(f"  {seconds:7.1f} s  {program if name == program else program + '.' + name}")
+    for seconds, name in sorted(results, reverse=True)[:SLOWEST_TESTS]:
+        lines.append(f"  {seconds:7.1f} s  {name}")
     programs: dict[str, list[float]] = {}
     for job in jobs:
         sums = programs.setdefault(job.test.name, [0, 0])
