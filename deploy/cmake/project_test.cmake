@@ -1,5 +1,6 @@
 # project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [READS path...] [COST seconds]
-#              [TIMEOUT seconds] [READER | SANITIZED] [ALONE] [APART] [CAMPAIGN])
+#              [TIMEOUT seconds] [READER | SANITIZED] [ALONE] [APART] [OPTIMISED]
+#              [CAMPAIGN])
 # A GoogleTest program. deploy/test runs all its tests in one process, or in several parts if they take long,
 # so what several of them need (an organ, a reduction) is made once. READS: files and folders of the
 # repository that they open. COST: about how long all of them take, on one core. READER: it tests what
@@ -7,7 +8,8 @@
 # undefined-behaviour sanitizers. SANITIZED: deploy/campaign sanitized does, as for readers. ALONE: no other test
 # runs beside it; for what measures time. CAMPAIGN: takes long, so only deploy/campaign runs it.
 # Its sources are compiled together, a dozen at a time, because their headers take longest. APART: one by one,
-# where they define the same names.
+# where they define the same names. OPTIMISED: its own sources are compiled as the product is; where they
+# assert times, or hashes of what they compute themselves.
 #
 # script_test(<name> COMMAND program argument... [PROGRAMS target...] [READS path...] [AFTER test...]
 #             [ENVIRONMENT NAME=value...] [COST seconds] [TIMEOUT seconds] [SKIP_CODE n] [ALONE] [WEB] [CAMPAIGN])
@@ -19,7 +21,7 @@
 add_custom_target(sanitized_tests)
 
 function(project_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "READER;SANITIZED;ALONE;APART;CAMPAIGN" "TIMEOUT;COST" "SOURCES;DEPENDS;LINK;READS")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "READER;SANITIZED;ALONE;APART;OPTIMISED;CAMPAIGN" "TIMEOUT;COST" "SOURCES;DEPENDS;LINK;READS")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "project_test(${name}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
   endif()
@@ -37,7 +39,10 @@ function(project_test name)
     string(REPLACE "/" "_" dependency_name ${dependency})
     target_link_libraries(${name} PRIVATE trocar_${dependency_name})
   endforeach()
-  use_precompiled_headers(${name} test ${ARG_DEPENDS})
+  if(NOT ARG_OPTIMISED)
+    target_compile_options(${name} PRIVATE ${TROCAR_TEST_OPTIONS})
+    use_precompiled_headers(${name} test ${ARG_DEPENDS})
+  endif()
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
   if(ARG_READER OR ARG_SANITIZED)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable
 
+import mutants
 from work import CORES, ROOT, Failed, Work
 
 BIN = "build/release/bin"
@@ -212,6 +213,8 @@ PARTS = {part.name: part for part in (
     Part("fuzz", fuzz, 1, "libFuzzer on every decoder of outside data, two at a time; one table. What it has learnt "
          "stays in --out and is where the next run begins",
          setup=("--with-clang",), options=("minutes",), length="minutes", amount=60, table="fuzz.md", keeps=True),
+    Part("mutants", mutants.run, 0.5, "a dozen mistakes, such as a wrong sign or a missing check, made in the product one "
+         "after the other: a test that every change has to pass must find each; one table"),
     Part("clang", clang, 1.5, "everything built by clang, each source by itself, and all tests: the same state hashes "
          "as with gcc", setup=("--with-clang",)),
     Part("tidy", tidy, 1, "clang-tidy over all sources; a warning is an error", setup=("--with-clang",), table=""),
