@@ -23,7 +23,7 @@ STATUS = re.compile(r"\[(\d+)/(\d+)\] (.*)")
 ROOT = Path(__file__).resolve().parents[2]
 # Seconds on one core of a machine of 2023: to compile a source, and for each file that it includes, itself
 # or through another of ours, which says more than its length; for any other step.
-OBJECT, PER_INCLUDED, OTHER = 1.5, 0.16, 0.5
+OBJECT, PER_INCLUDED, OTHER = 0.8, 0.08, 0.3
 # What CMake has to write again is written first. Ninja then reads its file through another, or it would
 # look once more whether CMake has, and say of nothing but that what there is to do.
 MANIFEST, INCLUDE = ["-f", "/dev/stdin"], "include build.ninja\n"
