@@ -15,6 +15,11 @@ find_program(GZIP_PROGRAM gzip)
 set(made "${PROJECT_BINARY_DIR}/manuals")
 set(manuals)
 
+# Installed programs have no lines for debuggers. CPack takes them into packages of their own.
+install(CODE [[
+  if(NOT "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}" MATCHES "/_CPack_Packages/")
+    set(CMAKE_INSTALL_DO_STRIP ON)
+  endif()]] ALL_COMPONENTS)
 foreach(entry IN LISTS TROCAR_COMPONENT_PROGRAMS)
   string(REPLACE ":" ";" entry ${entry})
   list(GET entry 0 component)

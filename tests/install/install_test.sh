@@ -97,6 +97,21 @@ check "completions are sound" inside bash -c \
   'for f in /usr/share/bash-completion/completions/trocar-*; do . $f; complete -p ${f##*/} || exit 1; done'
 check "each program has a page for man" inside sh -c \
   'for p in /usr/bin/trocar-*; do dpkg -L trocar-server trocar-client trocar-tools trocar-web | grep -q "man1/${p##*/}.1.gz" || exit 1; done'
+# Programs are stripped; what was taken away lies where a debugger looks, under the program's id.
+lines_for_debuggers() {
+  local file id faults=0
+  for file in "$root"/usr/bin/trocar-* "$root"/usr/lib/python3/dist-packages/trocar.*.so; do
+    [ -e "$file" ] || continue
+    id=$(readelf -n "$file" | sed -n 's/.*Build ID: //p')
+    if readelf -SW "$file" | grep -q '[.]debug_line' ||
+      ! readelf -SW "$root/usr/lib/debug/.build-id/${id:0:2}/${id:2}.debug" 2>/dev/null | grep -q '[.]debug_line'; then
+      echo "$file: its lines are in it, or not in $id"
+      faults=1
+    fi
+  done
+  return $faults
+}
+check "lines for debuggers have packages of their own" lines_for_debuggers
 check "nobody else may read the state" inside sh -c 'getent passwd trocar | grep -q nologin'
 inside useradd -m ada
 

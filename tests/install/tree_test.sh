@@ -8,7 +8,7 @@ trap 'rm -rf "$work"' EXIT
 faults=0
 fault() { printf '%s\n' "$*"; faults=$((faults + 1)); }
 
-cmake --install "$build" --prefix "$work/usr" --strip >"$work/log" 2>&1 || { tail -n 5 "$work/log"; exit 1; }
+cmake --install "$build" --prefix "$work/usr" >"$work/log" 2>&1 || { tail -n 5 "$work/log"; exit 1; }
 if grep -v "^-- \(Installing: $work\|Install configuration\)" "$work/log"; then
   fault "these lie outside of the prefix, or are no files"
 fi
@@ -17,6 +17,10 @@ if grep -q '^TROCAR_CLIENT:BOOL=ON' "$build/CMakeCache.txt"; then programs+=(cli
 for program in "${programs[@]}"; do
   "$work/usr/bin/trocar-$program" --version >/dev/null || fault "trocar-$program does not start"
 done
+find "$work/usr/bin" "$work/usr/lib" -type f \( -perm -u+x -o -name '*.so' \) >"$work/log"
+while read -r file; do
+  ! readelf -SW "$file" | grep -q '[.]debug_' || fault "${file#"$work/"} has lines for debuggers"
+done <"$work/log"
 for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-hall.service 'lib/systemd/system/trocar-relay@.service' lib/systemd/system/trocar-web.service \
   share/applications/trocar-join.desktop share/mime/packages/trocar.xml share/icons/hicolor/scalable/apps/trocar.svg \
   share/trocar/scenes/incise.toml share/doc/trocar/LICENSE share/doc/trocar/docs/install.md \
