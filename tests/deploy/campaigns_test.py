@@ -3,6 +3,7 @@
 
 import contextlib
 import io
+import json
 import subprocess
 import sys
 import tempfile
@@ -22,14 +23,14 @@ import record
 import whole
 from parts import PARTS
 from record import Outcome
-from work import Failed, suite_table
+from work import Failed, Work, suite_table
 
 CASES = """<testsuite tests="4" failures="1">
 <testcase name="soak.short" classname="x" time="40.5" status="run"><system-out>
 a &lt;failure in words</system-out></testcase>
-<testcase name="a_test.One.&lt;one&gt;" time="1.25" status="fail"><failure message="Failed"/></testcase>
-<testcase name="a_test.One.two" time="2.5" status="run"/>
-<testcase name="claims_model" time="0" status="notrun"><skipped message="SKIP"/></testcase></testsuite>"""
+<testcase classname="a_test" name="a_test.One.&lt;one&gt;" time="1.25"><failure>Failed</failure></testcase>
+<testcase classname="a_test" name="a_test.One.two" time="2.5" />
+<testcase name="claims_model" time="0"><skipped>SKIPPED: spin is missing</skipped></testcase></testsuite>"""
 
 
 class CommandLine(unittest.TestCase):
@@ -138,6 +139,17 @@ class Whole(unittest.TestCase):
 
 
 class Parts(unittest.TestCase):
+    def test_tests_fail_with_their_report_or_with_their_program(self):
+        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+            for case, code, said in (("<failure/>", 0, "1 tests failed"), ("<failure/>", 1, "1 tests failed"),
+                                     ("", 1, "bash ended with 1"), ("", 0, None)):
+                script = f'echo "<testcase name=\'a.b.c\' time=\'1\'>{case}" | tr "\'" \'"\' >"$2/x.xml"; exit {code}'
+                tests = lambda: Work(None, Path(folder)).run_tests("bash", "-c", script, "x")
+                if said:
+                    self.assertRaisesRegex(Failed, said, tests)
+                else:
+                    tests()
+
     def test_a_part_that_does_not_end_is_ended_with_all_it_started(self):
         program = subprocess.Popen(["bash", "-c", "sleep 60 & sleep 60"], stdout=subprocess.PIPE,
                                    start_new_session=True)
@@ -192,7 +204,8 @@ class Places(unittest.TestCase):
 """
 
     def test_it_finds_what_is_missing_what_is_too_much_and_what_does_not_exist(self):
-        tests = [{"name": "soak.short", "part": "campaign"}, {"name": "b_test", "part": "campaign"}, {"name": "a_test"}]
+        tests = [{"name": name, "part": "campaign"} for name in ("soak.short", "b_test")]
+        tests.append({"name": "a_test", "part": ""})
         found = places.faults(self.PAGE, tests)
         self.assertEqual(len(found), 3, found)
         for fault, words in zip(found, ("b_test is marked CAMPAIGN, but not named", "a_test is named, but not marked",
@@ -206,8 +219,8 @@ class Places(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             page, tests = Path(folder) / "page.md", Path(folder) / "tests.json"
             page.write_text(self.PAGE)
-            for text, code in (('{"tests": []}', 1), ("{", 3), ('{"tests": [{"name": "soak.short", "part": "campaign"}, '
-                               '{"name": "gone", "part": "campaign"}, {"name": "a_test", "part": "campaign"}]}', 0)):
+            whole = {"tests": [{"name": name, "part": "campaign"} for name in ("soak.short", "gone", "a_test")]}
+            for text, code in (('{"tests": []}', 1), ("{", 3), (json.dumps(whole), 0)):
                 tests.write_text(text)
                 with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
                     self.assertEqual(places.main([str(page), str(tests)]), code, text)

@@ -34,18 +34,17 @@ class Part:
 def tests(work):
     # Together with them everything that only campaigns and benchmarks use is built: it has to compile.
     work.build("release", "all", "on_demand")
-    work.call("deploy/test", "--campaign", "--out", str(work.out), *work.yes(), codes=(0, 1))
-    work.judge_tests()
+    work.run_tests("deploy/test", "--campaign", *work.yes())
 
 
 def sanitized(work):
     work.build("clang-fuzz", "sanitized_tests")
-    work.run_tests("clang-fuzz", "--sanitized")
+    work.run_suite("clang-fuzz", "--sanitized")
 
 
 def tsan(work):
     work.build("tsan", "all", "on_demand")
-    work.run_tests("tsan", env={"TSAN_OPTIONS": f"halt_on_error=1 suppressions={ROOT}/deploy/lib/tsan.supp"})
+    work.run_suite("tsan", env={"TSAN_OPTIONS": f"halt_on_error=1 suppressions={ROOT}/deploy/lib/tsan.supp"})
 
 
 def configure_clang(work):
@@ -57,7 +56,7 @@ def configure_clang(work):
 def clang(work):
     configure_clang(work)
     work.call("ninja", "-C", "build/clang", "all", "on_demand")
-    work.run_tests("clang")
+    work.run_suite("clang")
 
 
 def tidy(work):

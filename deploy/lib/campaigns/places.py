@@ -20,7 +20,7 @@ def named_tests(page: str) -> set[str]:
 
 
 def faults(page: str, tests: list[dict]) -> list[str]:
-    named, marked = named_tests(page), {test["name"] for test in tests if test.get("part") == "campaign"}
+    named, marked = named_tests(page), {test["name"] for test in tests if test["part"] == "campaign"}
     everything = {test["name"] for test in tests}
     if not named:
         return [f'"{HEADING}" has no test with {PLACE} in its second cell']

@@ -62,7 +62,7 @@ class Record:
             part, folder = PARTS[outcome.name], self.folder / outcome.name
             text += f"\n## {part.name}\n\n{part.about[0].upper()}{part.about[1:]}.\n\n"
             if not outcome.passed:
-                text += "```text\n" + "\n".join(last_lines(folder / "log.txt", 20)) + "\n```\n\n"
+                text += "```text\n" + "\n".join(last_lines(folder / "log.txt", 10)) + "\n```\n\n"
             if part.table and (folder / part.table).exists():
                 text += re.sub(r"^#", "###", (folder / part.table).read_text(), flags=re.MULTILINE)
             text += f"\nAll of it is in `{part.name}/`.\n"

@@ -65,8 +65,8 @@ def run_all(options, out: Path) -> int:
     if subprocess.call([ROOT / "deploy/setup", "--with-tests", *wanted, *(["--yes"] if options.yes else [])]):
         raise Failed(5, "something is missing, see above")
     hours = share(waiting, options.hours)
-    print(f"deploy/campaign: {len(waiting)} parts, about {sum(hours.values()):.1f} hours on two cores; what each says "
-          f"goes to {out}/NAME/log.txt", flush=True)
+    print(f"deploy/campaign: {len(waiting)} of {len(PARTS)} parts, about {sum(hours.values()):.1f} hours on two cores; "
+          f"what each says goes to {out}/NAME/log.txt", flush=True)
     for number, part in enumerate(waiting, 1):
         print(f"[{number}/{len(waiting)}] {part.name:<10} about {60 * hours[part.name]:.0f} min: ", end="", flush=True)
         outcome = run_part(part, hours[part.name], options, out / part.name)
