@@ -14,7 +14,8 @@ set(TROCAR_SESSION_HEADERS
 
 # Without the first ccache does not see the header. The others: gcc 12 takes std::string + text for an
 # overrun (its bug 105651), and says so where the header of strings is precompiled.
-set(TROCAR_PRECOMPILED_OPTIONS -fpch-preprocess -Wno-array-bounds -Wno-restrict)
+set(TROCAR_PRECOMPILED_OPTIONS
+  -fpch-preprocess -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread)
 set(TROCAR_PRECOMPILED_SOURCE "${PROJECT_BINARY_DIR}/precompiled.cpp")
 file(CONFIGURE OUTPUT "${TROCAR_PRECOMPILED_SOURCE}" CONTENT "// Carries the flags of precompiled headers.\n")
 
