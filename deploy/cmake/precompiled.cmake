@@ -40,34 +40,25 @@ function(use_product_headers target)
   endif()
 endfunction()
 
-# One target for each precompiled header, in tests/CMakeLists.txt once all folders are known:
-# trocar_test_headers, trocar_session_test_headers and, without Google Test, trocar_session_headers.
+# Of tests, in tests/CMakeLists.txt once all folders are known: trocar_test_headers, and
+# trocar_session_test_headers for those that run the tissue.
 function(add_precompiled_headers)
   if(NOT TROCAR_PRECOMPILES)
     return()
   endif()
-  foreach(name IN ITEMS test session_test session)
+  foreach(name IN ITEMS test session_test)
     add_library(trocar_${name}_headers OBJECT "${TROCAR_PRECOMPILED_SOURCE}")
-    target_link_libraries(trocar_${name}_headers PRIVATE trocar_options)
-    set(headers ${TROCAR_STANDARD_HEADERS})
-    if(name MATCHES "test")
-      target_link_libraries(trocar_${name}_headers PRIVATE GTest::gtest)
-      list(PREPEND headers <gtest/gtest.h>)
-    endif()
-    if(name MATCHES "session")
+    target_link_libraries(trocar_${name}_headers PRIVATE trocar_options GTest::gtest)
+    set(headers <gtest/gtest.h> ${TROCAR_STANDARD_HEADERS})
+    if(name STREQUAL "session_test")
       target_link_libraries(trocar_${name}_headers PRIVATE
         trocar_server_tissue_step trocar_server_organs_catalogue)
       list(APPEND headers ${TROCAR_SESSION_HEADERS})
     endif()
     target_precompile_headers(trocar_${name}_headers PRIVATE ${headers})
-    target_compile_options(trocar_${name}_headers PRIVATE -fpch-preprocess)
-    if(name STREQUAL "session")
-      make_position_independent(trocar_${name}_headers)
-    else()
-      target_compile_options(trocar_${name}_headers PRIVATE ${TROCAR_TEST_OPTIONS})
-      # Position-independent as executables are.
-      set_target_properties(trocar_${name}_headers PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-    endif()
+    target_compile_options(trocar_${name}_headers PRIVATE -fpch-preprocess ${TROCAR_TEST_OPTIONS})
+    # Position-independent as executables are.
+    set_target_properties(trocar_${name}_headers PROPERTIES POSITION_INDEPENDENT_CODE OFF)
     if(CCACHE_PROGRAM)
       # A precompiled header holds the paths of what it includes: one from another checkout does not
       # know this one's headers, which would then be read twice.
@@ -77,22 +68,15 @@ function(add_precompiled_headers)
   endforeach()
 endfunction()
 
-# use_precompiled_headers(<target> <kind> <folder>...): `kind` is test or program, the folders what
-# the target depends on.
-function(use_precompiled_headers target kind)
+# use_test_headers(<target> <folder>...): the folders are what the target depends on.
+function(use_test_headers target)
   if(NOT TROCAR_PRECOMPILES)
     return()
   endif()
-  if(server/tissue/step IN_LIST ARGN OR kind STREQUAL "test")
-    target_compile_options(${target} PRIVATE ${TROCAR_PRECOMPILED_OPTIONS})
-  endif()
+  target_compile_options(${target} PRIVATE ${TROCAR_PRECOMPILED_OPTIONS})
   if(server/tissue/step IN_LIST ARGN)
-    if(kind STREQUAL "test")
-      target_precompile_headers(${target} REUSE_FROM trocar_session_test_headers)
-    else()
-      target_precompile_headers(${target} REUSE_FROM trocar_session_headers)
-    endif()
-  elseif(kind STREQUAL "test")
+    target_precompile_headers(${target} REUSE_FROM trocar_session_test_headers)
+  else()
     target_precompile_headers(${target} REUSE_FROM trocar_test_headers)
   endif()
 endfunction()

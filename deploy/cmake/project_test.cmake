@@ -41,7 +41,7 @@ function(project_test name)
   endforeach()
   if(NOT ARG_OPTIMISED)
     target_compile_options(${name} PRIVATE ${TROCAR_TEST_OPTIONS})
-    use_precompiled_headers(${name} test ${ARG_DEPENDS})
+    use_test_headers(${name} ${ARG_DEPENDS})
   endif()
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
