@@ -27,7 +27,7 @@ Long checks that are not part of deploy/test. Each takes about the hours beside 
   --hours H    for soak: instead of 1. For all: what {able}
                take together; without it each of them takes half of the hours above
   --only NAME,NAME  for all: only these parts
-  --resume     for all: what the folder has a result of, on the same commit, is not run again
+  --resume     for all: what has passed on the same commit, by the report in the folder, is not run again
   --write      for all: puts date, commit, minutes and outcome of each part into CONTRIBUTING.md
   --short      for soak: a minute
   --minutes N  for fuzz and hour: instead of 60

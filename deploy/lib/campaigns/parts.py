@@ -108,7 +108,7 @@ def cuts(work):
                                 str(CORES), "--csv", table] for part, table in enumerate(tables)], to="cuts-{}.txt")
     # 1 only says that a part by itself does not keep the laws.
     if any(code not in (0, 1) for code in codes):
-        raise Failed(1, f"a part of the cuts has ended early, see {work.out}")
+        raise Failed(1, f"a part of the cuts has ended early (codes {codes}), see {work.out}")
     work.call(f"{BIN}/cut_campaign", "table", *tables, to="table.md", why=f"a law of cuts is broken, see {work.out}")
 
 

@@ -51,9 +51,11 @@ class Record:
         whole.replace(self.file)
         (self.folder / "report.md").write_text(self.report())
 
+    def passed(self) -> list[str]:
+        return [outcome.name for outcome in self.outcomes.values() if outcome.passed]
+
     def count(self) -> str:
-        passed = sum(outcome.passed for outcome in self.outcomes.values())
-        return f"{passed} passed, {len(self.outcomes) - passed} failed"
+        return f"{len(self.passed())} passed, {len(self.outcomes) - len(self.passed())} failed"
 
     def report(self) -> str:
         rows = [outcome.row() for outcome in self.outcomes.values()]

@@ -57,7 +57,7 @@ def run_all(options, out: Path) -> int:
     others = [outcome.name for outcome in record.outcomes.values() if outcome.commit != now]
     if others:
         raise Failed(2, f"--resume: {', '.join(others)} ran on another commit than {now}: leave --resume out")
-    waiting = [part for part in parts if part.name not in record.outcomes]
+    waiting = [part for part in parts if part.name not in record.passed()]
     for part in waiting if not options.resume else []:
         if not part.keeps:
             shutil.rmtree(out / part.name, ignore_errors=True)
