@@ -32,9 +32,13 @@ if(TROCAR_PRECOMPILES AND TROCAR_UNITY)
   make_position_independent(trocar_product_headers)
 endif()
 
-# For a target that make_position_independent() made.
+# For libraries that make_position_independent() made, and for programs, which are then compiled as these are.
 function(use_product_headers target)
   if(TARGET trocar_product_headers)
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL "EXECUTABLE")
+      target_compile_options(${target} PRIVATE -fPIC ${TROCAR_POSITION_INDEPENDENT_OPTIONS})
+    endif()
     target_compile_options(${target} PRIVATE ${TROCAR_PRECOMPILED_OPTIONS})
     target_precompile_headers(${target} REUSE_FROM trocar_product_headers)
   endif()

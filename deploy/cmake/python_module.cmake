@@ -1,9 +1,10 @@
 # The Python module is made of the same libraries as the programs, so these are position-independent.
 # Hidden, and with -fno-semantic-interposition, a function is still called directly and inlined: nobody
 # can put another in its place. Programs are compiled so, too: one precompiled header serves all.
+set(TROCAR_POSITION_INDEPENDENT_OPTIONS -fvisibility=hidden -fno-semantic-interposition)
 function(make_position_independent target)
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  target_compile_options(${target} PRIVATE -fvisibility=hidden -fno-semantic-interposition)
+  target_compile_options(${target} PRIVATE ${TROCAR_POSITION_INDEPENDENT_OPTIONS})
 endfunction()
 
 if(TROCAR_PYTHON)
