@@ -29,7 +29,9 @@ namespace {
 
 volatile std::sig_atomic_t stop_requested = 0;
 
-constexpr std::uint64_t kPollNs = 4'000'000;  // samples of mouse and scripts leave every 8 ms
+constexpr std::uint64_t kPollNs = 4'000'000;  // samples of a mouse leave every 8 ms
+// A script answers each frame soon: a server may wait for it (trocar-server --pace).
+constexpr std::uint64_t kScriptPollNs = 1'000'000;
 constexpr std::uint64_t kGoodbyeNs = 2'500'000'000;  // longer than its source waits for that
 
 class Run {
@@ -54,7 +56,7 @@ class Run {
   Status step(std::uint64_t now_ns);
   Status poll();
   void measure(std::uint64_t now_ns);
-  void use_marks(std::uint64_t now_ns);
+  void use_marks();
   bool is_over(std::uint64_t now_ns);
   bool stays_open() const;
   Status take_screenshot(std::uint64_t now_ns, bool is_last);
@@ -71,6 +73,7 @@ class Run {
   PicturePace pace_;
   std::uint64_t start_ns_ = 0;
   std::uint64_t live_ns_ = 0;  // when the first frame was there
+  Tick live_tick_ = 0;         // that it showed
   bool has_screenshot_ = false, has_marked_ = false, has_returned_ = false;
   bool has_answered_ = false;
   std::string exit_reason_;
@@ -97,11 +100,12 @@ Status Run::step(std::uint64_t now_ns) {
   if (const auto polled = poll(); !polled) return polled.error();
   if (live_ns_ == 0 && replica_.newest() != nullptr) {
     live_ns_ = now_ns;
+    live_tick_ = replica_.newest()->tick;
     log::info("in the session: {}, {} surface vertices", replica_.topology().organ_name,
               replica_.topology().rest_positions.size());
   }
   if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
-  use_marks(now_ns);
+  use_marks();
   measure(now_ns);
   if (picture_) picture_->observe(replica_, hands_, now_ns);
   if (picture_ && pace_.is_due(now_ns)) {
@@ -135,17 +139,18 @@ void Run::measure(std::uint64_t now_ns) {
   last_change_us_ = change_us;
 }
 
-void Run::use_marks(std::uint64_t now_ns) {
-  if (live_ns_ == 0) return;
-  const auto ask_at = [&](double seconds, bool& has_asked, bool is_return) {
-    if (has_asked || seconds < 0 || static_cast<double>(now_ns - live_ns_) * 1e-9 < seconds) return;
-    has_asked = replica::ask_for_mark(source_, is_return);
-  };
-  const double seconds = static_cast<double>(now_ns - live_ns_) * 1e-9;
-  if (!has_answered_ && options_.answer_at >= 0 && seconds >= options_.answer_at)
+// What is done by itself goes by simulated time, as scripts do.
+void Run::use_marks() {
+  if (live_ns_ == 0 || replica_.newest() == nullptr) return;
+  const Tick newest = replica_.newest()->tick;
+  const double seconds = static_cast<double>(newest - std::min(newest, live_tick_)) /
+                         static_cast<double>(kTicksPerSecond);
+  const auto is_due = [&](double at) { return at >= 0 && seconds >= at; };
+  if (!has_answered_ && is_due(options_.answer_at))
     has_answered_ = replica::send_lesson_wish(source_, replica::LessonWish::Answer);
-  ask_at(options_.mark_at, has_marked_, false);
-  ask_at(options_.return_at, has_returned_, true);
+  if (!has_marked_ && is_due(options_.mark_at)) has_marked_ = replica::ask_for_mark(source_, false);
+  if (!has_returned_ && is_due(options_.return_at))
+    has_returned_ = replica::ask_for_mark(source_, true);
 }
 
 // A window that closed by itself would leave a person without a word: it says what happened, over
@@ -222,7 +227,7 @@ Result<ExitCode> Run::run() {
     if (const auto stepped = step(now); !stepped) return conclude(stepped);
     if (is_over(now)) return conclude({});
     const std::uint64_t after = monotonic_ns();
-    std::uint64_t wake = after + kPollNs;
+    std::uint64_t wake = after + (hands_.has_script() ? kScriptPollNs : kPollNs);
     if (picture_) wake = std::clamp(pace_.next_ns(), after, wake);
     std::this_thread::sleep_for(std::chrono::nanoseconds(wake - after));
   }

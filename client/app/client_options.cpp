@@ -300,11 +300,11 @@ void add_time_options(CLI::App& app, ClientOptions& options) {
       ->type_name("N")
       ->check(from_to(0, 1e9));
   app.add_option("--answer-at", options.answer_at,
-                 "in a lesson: say that it is here so many seconds after joining")
+                 "in a lesson: say that it is here so many simulated seconds after joining")
       ->type_name("S")
       ->check(from_to(0, 1e6));
   app.add_option("--mark-at", options.mark_at,
-                 "as instructor: mark the organ so many seconds after joining")
+                 "as instructor: mark the organ so many simulated seconds after joining")
       ->type_name("S")
       ->check(from_to(0, 1e6));
   app.add_option("--return-at", options.return_at, "as instructor: return it to the mark then")

@@ -196,15 +196,18 @@ std::optional<double> Hands::observe_echo_ms(const replica::Replica& replica,
   return std::nullopt;
 }
 
-double Hands::script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns) {
-  // Between frames the wall clock carries on, by at most the time to the next frame.
-  const std::uint64_t since = now_ns > newest.arrival_ns ? now_ns - newest.arrival_ns : 0;
-  const std::uint64_t next = kTicksPerFrame * kTickNanoseconds;
-  const double seconds =
-      static_cast<double>(newest.tick - std::min(newest.tick, script_start_tick_)) /
-          static_cast<double>(kTicksPerSecond) +
-      static_cast<double>(std::min(since, next)) * 1e-9;
-  return script_seconds_ = std::max(script_seconds_, seconds);
+void Hands::send_script(const replica::SessionFrame& newest, replica::SessionSource& source,
+                        std::uint64_t now_ns) {
+  constexpr double kInterval = 1e-9 * static_cast<double>(device::kSampleIntervalNs);
+  const double seconds = script_clock_.seconds(newest.tick, newest.arrival_ns, now_ns);
+  // A hand is not silent while time stands still.
+  if (seconds - script_sent_seconds_ < kInterval &&
+      now_ns - script_sent_ns_ < device::kSampleIntervalNs)
+    return;
+  script_sent_seconds_ = seconds;
+  script_sent_ns_ = now_ns;
+  for (std::size_t tool = 0; tool < script_hand_->tool_count(); ++tool)
+    send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds), now_ns);
 }
 
 Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& source,
@@ -224,14 +227,8 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
     script_.reset();
     if (!hand) return hand.error();
     script_hand_ = std::move(*hand);
-    script_start_tick_ = replica.newest()->tick;
   }
-  if (script_hand_ && now_ns - script_sent_ns_ >= device::kSampleIntervalNs) {
-    script_sent_ns_ = now_ns;
-    const double seconds = script_seconds(*replica.newest(), now_ns);
-    for (std::size_t tool = 0; tool < script_hand_->tool_count(); ++tool)
-      send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds), now_ns);
-  }
+  if (script_hand_) send_script(*replica.newest(), source, now_ns);
   return {};
 }
 

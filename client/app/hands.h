@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/app/felt_replay.h"
+#include "client/app/script_clock.h"
 #include "client/device/mouse_tool.h"
 #include "client/device/script_hand.h"
 #include "client/replica/hand_echo.h"
@@ -60,6 +61,7 @@ class Hands {
   // The pointer moves the person's other hand.
   void switch_hand(const device::PointerInput& input, const device::ViewRays& view);
 
+  bool has_script() const { return script_ || script_hand_; }
   // Sends what is due, and starts devices. A script begins with the first frame this client shows
   // and runs in simulated time, so that it is the same script on a server that cannot keep up. An
   // error means that it does not fit the organ.
@@ -71,8 +73,8 @@ class Hands {
                                         std::uint64_t now_ns);
 
  private:
-  // Simulated seconds since the script began; never goes back.
-  double script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns);
+  void send_script(const replica::SessionFrame& newest, replica::SessionSource& source,
+                   std::uint64_t now_ns);
   void send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
             std::uint64_t now_ns);
   Status tend_felt(const replica::Replica& replica);
@@ -94,8 +96,8 @@ class Hands {
   std::optional<tool::Script> script_;  // until the surface is known
   std::optional<device::ScriptHand> script_hand_;
   std::vector<tool::ToolShape> script_shapes_;
-  Tick script_start_tick_ = 0;
-  double script_seconds_ = 0;
+  ScriptClock script_clock_;
+  double script_sent_seconds_ = 0;  // simulated
   std::uint64_t script_sent_ns_ = 0;
   std::uint32_t sequence_ = 0;
   replica::HandEcho echo_;

@@ -52,6 +52,16 @@ TEST(Pacer, a_rate_stretches_the_time_between_ticks) {
   EXPECT_EQ(pacer.slow_ticks(), 0u) << "that is no lateness";
 }
 
+TEST(Pacer, faster_than_real_time_nothing_is_late) {
+  app::Pacer pacer(0);
+  pacer.restart(0, 10);
+  pacer.begin_tick(0);
+  EXPECT_EQ(pacer.due_ns(), kTickNanoseconds / 10);
+  pacer.begin_tick(50 * kTickNanoseconds);
+  EXPECT_EQ(pacer.slow_ticks(), 0u);
+  EXPECT_GT(pacer.due_ns(), 49 * kTickNanoseconds) << "and nothing is made up for";
+}
+
 TEST(Pacer, random_stalls_keep_the_books) {
   for (unsigned seed = 0; seed < 100; ++seed) {
     std::mt19937 random(seed);
@@ -139,6 +149,8 @@ TEST(SimulationLoop, a_pause_stops_at_a_frame_and_changes_no_tick) {
     loop.start();
     std::vector<step::SharedFrame> taken;
     if (pauses) {
+      while (taken.empty()) handover.pop_all(taken);
+      EXPECT_EQ(taken.back()->frame, 1u) << "there is something to see";
       // More than its queue holds arrives meanwhile, and nobody is refused.
       for (std::uint8_t round = 0; round < 200; ++round) {
         while (!inbox.try_push_join({.slot = {0}})) std::this_thread::yield();
@@ -157,6 +169,34 @@ TEST(SimulationLoop, a_pause_stops_at_a_frame_and_changes_no_tick) {
     hashes.push_back(simulation.state_hash());
   }
   EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+TEST(SimulationLoop, goes_faster_only_while_hands_follow) {
+  step::Simulation simulation(*catalogue::make_lattice({4, 3, 4, 0.01}));
+  participants::SimulationInbox inbox;
+  app::FrameHandover handover([] {});
+  app::SimulationLoop loop(simulation, inbox, handover, nullptr, {.pace = 10}, [] {});
+  const auto run_to = [&](Frame frame) {
+    while (simulation.current_tick() < frame * kTicksPerFrame) loop.run_tick();
+  };
+  run_to(1);
+  EXPECT_EQ(loop.rate(), 1) << "nobody has shown anything";
+  loop.note_followed(1);
+  EXPECT_EQ(loop.rate(), 10);
+  run_to(3);
+  EXPECT_EQ(loop.rate(), 10);
+  loop.run_tick();
+  EXPECT_EQ(loop.rate(), 1) << "frames 2 and 3 are on their way";
+  loop.note_followed(2);
+  EXPECT_EQ(loop.rate(), 10);
+  loop.set_rate(0.5f);
+  EXPECT_EQ(loop.rate(), 5);
+  loop.set_rate(0);
+  EXPECT_EQ(loop.rate(), 0);
+  loop.note_followed(0);
+  EXPECT_EQ(loop.rate(), 0);
+  loop.request_stop();
+  EXPECT_EQ(loop.rate(), 1) << "it ends with a frame";
 }
 
 TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {

@@ -14,6 +14,7 @@ refuses() { # PROGRAM ARGUMENT...: the option is the last one, without its value
 }
 refuses trocar-server --budget
 refuses trocar-server --seconds
+refuses trocar-server --pace
 refuses trocar-client --wait
 refuses trocar-client --fps
 refuses trocar-client --seconds

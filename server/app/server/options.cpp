@@ -17,6 +17,7 @@
 namespace trocar::app {
 namespace {
 
+constexpr double kMostPace = 20;
 constexpr const char* kExampleFile = "deploy/trocar-server.toml.example";
 constexpr const char* kExamples = R"(
 Examples:
@@ -308,6 +309,17 @@ void CommandLine::add_session_options() {
   app_.add_option("--seconds", options_.seconds, "end after this many simulated seconds")
       ->type_name("N")
       ->check(between(0, 1e9));
+  app_.add_option("--wait-for", options_.awaited_people,
+                  "let time stand still after the first frame until so many people are there")
+      ->type_name("N")
+      ->check(CLI::Range(0, kMaxHands + kMaxWatchers))
+      ->capture_default_str();
+  app_.add_option("--pace", options_.pace,
+                  "let time go up to so many times as fast while all hands follow, for sessions of "
+                  "scripts; ticks then do all that is asked for, as with --fixed-decisions")
+      ->type_name("N")
+      ->check(between(1, kMostPace))
+      ->capture_default_str();
   app_.add_option("--summary", options_.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
   app_.add_option(
@@ -329,6 +341,8 @@ Status CommandLine::check(const std::string& key, const std::string& text) {
 }
 
 Status CommandLine::finish() {
+  // Nothing is to be given up for a tick's millisecond.
+  if (options_.pace > 1) options_.has_fixed_decisions = true;
   options_.is_organ_chosen = organ_->count() > 0;
   options_.are_sweeps_chosen = research_.sweeps->count() > 0;
   // CLI11 writes false where nobody has said anything.

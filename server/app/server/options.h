@@ -35,6 +35,8 @@ struct ServerOptions {
   bool is_unannounced = false;     // otherwise it is announced where others may reach it
   std::string journal;             // a file, or "none"
   double seconds = 0;              // simulated; 0: until told to end
+  double pace = 1;                 // of real time at most, while hands follow
+  std::size_t awaited_people = 0;  // time begins when so many are there
   std::string summary_file;        // empty: none
   std::string ready_file;          // empty: none
   step::TickDecisions decisions;   // fixed, or the most that the rate controller decides

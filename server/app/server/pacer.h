@@ -27,13 +27,14 @@ class Pacer {
   void begin_tick(std::uint64_t now_ns) {
     const std::uint64_t due_count = (now_ns - due_ns_) / period_ns_ + 1;
     if (due_count > kBackToBack) {
-      slow_ticks_ += due_count - kBackToBack;
+      if (period_ns_ >= kTickNanoseconds) slow_ticks_ += due_count - kBackToBack;
       due_ns_ += (due_count - kBackToBack) * period_ns_;
     }
     due_ns_ += period_ns_;
   }
 
-  // Ticks by which simulated time has fallen behind real time at that rate.
+  // Ticks by which simulated time has fallen behind real time at that rate; faster than real time
+  // nothing is late.
   std::uint64_t slow_ticks() const { return slow_ticks_; }
 
  private:

@@ -90,6 +90,7 @@ class Server {
   // Lets those who were in a session that goes on come back; other hands leave.
   void restore_people();
   void note_participants(const std::vector<participants::Participant>& present, Tick tick);
+  void settle_rate();
   void announce();
   void publish_frames();
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
@@ -138,6 +139,8 @@ class Server {
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
   std::string goodbye_ = "the session is over";
+  float rate_ = 1;            // as an instructor wants it
+  bool is_awaiting_ = false;  // time begins when enough people are there
   bool is_ending_ = false, is_paused_ = false;
   Tick next_warning_ = 0;
   double wall_seconds_ = 0;
@@ -187,8 +190,11 @@ Status Server::open() {
   replication.haptic_laws = touch::haptic_laws(organ);
   replication.return_seconds = options_.access.return_seconds;
   replication.places = limits.places;
-  replication.max_messages_per_second = limits.messages_per_second;
-  replication.max_bytes_per_second = 1000 * limits.kilobytes_per_second;
+  const auto per_real_second = [this](std::uint32_t limit) {
+    return static_cast<std::uint32_t>(limit * options_.pace);
+  };
+  replication.max_messages_per_second = per_real_second(limits.messages_per_second);
+  replication.max_bytes_per_second = per_real_second(1000 * limits.kilobytes_per_second);
   replication.on_participants = [this](const auto& present, Tick tick) {
     note_participants(present, tick);
   };
@@ -205,10 +211,11 @@ Status Server::open() {
     loop_->request_stop();
   };
   replication.on_pace = [this](float rate) {
-    loop_->set_rate(rate);
-    is_paused_ = rate == 0;
-    if (is_paused_) attend();
+    rate_ = rate;
+    settle_rate();
   };
+  if (options_.pace > 1)
+    replication.on_followed = [this](Frame frame) { loop_->note_followed(frame); };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
@@ -246,7 +253,28 @@ void Server::restore_people() {
               start_.participants.size(), options_.access.return_seconds);
 }
 
+void Server::settle_rate() {
+  const float rate = is_awaiting_ ? 0 : rate_;
+  loop_->set_rate(rate);
+  is_paused_ = rate == 0;
+  if (is_paused_) attend();
+}
+
+// While no frames come, people come and go all the same.
+void Server::attend() {
+  attention_.expires_after(kAttentionPeriod);
+  attention_.async_wait([this](boost::system::error_code error) {
+    if (error || !is_paused_ || is_ending_) return;
+    replicator_->attend();
+    attend();
+  });
+}
+
 void Server::note_participants(const std::vector<participants::Participant>& present, Tick tick) {
+  if (is_awaiting_ && present.size() >= options_.awaited_people) {
+    is_awaiting_ = false;
+    settle_rate();
+  }
   if (journal_) journal_->record_participants(present, tick);
   if (announcer_) announcer_->set_people(static_cast<int>(present.size()));
   if (sidecar_) sidecar_->set_people(present.size());
@@ -279,7 +307,7 @@ step::TickDecisions Server::most_decisions() const {
 
 LoopOptions Server::loop_options() {
   const auto decisions = most_decisions();
-  LoopOptions loop{.decisions = decisions};
+  LoopOptions loop{.decisions = decisions, .pace = static_cast<float>(options_.pace)};
   if (start_.bleeding) loop.bleeding = &*start_.bleeding;
   if (options_.seconds > 0)
     loop.tick_count = simulation_.current_tick() + ticks_of(options_.seconds);
@@ -321,6 +349,8 @@ Status Server::run() {
   std::fputs(admission_->invitation(tcp_->port()).c_str(), stdout);
   std::fflush(stdout);
   newest_ns_ = monotonic_ns();
+  is_awaiting_ = options_.awaited_people > 0;
+  settle_rate();
   loop_->start();
   if (sidecar_) sidecar_->start();
   const Status ran = net::run(io_);
@@ -331,16 +361,6 @@ Status Server::run() {
   wall_seconds_ = static_cast<double>(monotonic_ns() - begin) * 1e-9;
   const Status finished = finish();
   return ran.ok() ? finished : ran;
-}
-
-// While no frames come, people come and go all the same.
-void Server::attend() {
-  attention_.expires_after(kAttentionPeriod);
-  attention_.async_wait([this](boost::system::error_code error) {
-    if (error || !is_paused_ || is_ending_) return;
-    replicator_->attend();
-    attend();
-  });
 }
 
 void Server::on_signal(int signal) {

@@ -14,6 +14,8 @@ constexpr Tick kSnapshotPeriod = 10'000;
 constexpr Tick kSnapshotPhase = kTicksPerFrame / 2;
 constexpr unsigned long kTimerSlackNs = 1000;
 constexpr std::uint64_t kPauseNapNs = 5'000'000;
+// One frame is on its way to the hands while the next is computed.
+constexpr Frame kFramesAhead = 2;
 
 void sleep_until(std::uint64_t monotonic) {
   const timespec until{static_cast<time_t>(monotonic / 1'000'000'000),
@@ -113,9 +115,8 @@ void SimulationLoop::run() {
   bool is_last = false;
   float paced = 1;
   while (!is_last) {
-    const bool is_stopping = is_stop_requested_.load(std::memory_order_relaxed);
-    const float rate = is_stopping ? 1.0f : rate_.load(std::memory_order_relaxed);
-    const bool is_shown = publishes_frame(simulation_.current_tick());
+    const float rate = this->rate();
+    const bool is_shown = report_.last_frame && publishes_frame(simulation_.current_tick());
     if (rate == 0 && is_shown) {
       inbox_.gather();
       sleep_until(monotonic_ns() + kPauseNapNs);
@@ -131,6 +132,14 @@ void SimulationLoop::run() {
     is_last = run_tick();
   }
   ended_();
+}
+
+float SimulationLoop::rate() const {
+  if (is_stop_requested_.load(std::memory_order_relaxed)) return 1;
+  const Frame followed = followed_.load(std::memory_order_relaxed);
+  const bool is_followed =
+      followed > 0 && simulation_.current_tick() <= kTicksPerFrame * (followed + kFramesAhead);
+  return rate_.load(std::memory_order_relaxed) * (is_followed ? options_.pace : 1);
 }
 
 bool SimulationLoop::run_tick() {

@@ -1,6 +1,8 @@
 #pragma once
 
-// The simulation thread: 1 kHz by absolute time, inputs in, frames out.
+// The simulation thread: 1 kHz by absolute time, inputs in, frames out. Scripted hands may have
+// time go faster: as long as all hands have shown the newest frames, ticks come up to `pace` times
+// as fast. A hand that does not follow, or one that is away, has real time.
 //
 //   inbox.drain -> Simulation::tick -> record -> RateController::observe, which decides the next
 //   tick; every 16th tick: complete the frame (blood, records, hash, statistics, snapshot),
@@ -80,6 +82,7 @@ struct LoopReport {
 
 struct LoopOptions {
   step::TickDecisions decisions;  // without a rate controller
+  float pace = 1;                 // of real time at most, while hands follow
   std::optional<control::RateLimits> rate;
   Tick tick_count = 0;  // end at the first frame at or after this; 0: when told to
   bleeding::Bleeding* bleeding = nullptr;  // of a session that bleeds; outlives the loop
@@ -102,11 +105,15 @@ class SimulationLoop {
   // Simulated time over real time, for ticks to come; 0: none comes after the next frame, until the
   // rate is another or the loop is to end. Any thread.
   void set_rate(float rate) { rate_.store(rate, std::memory_order_relaxed); }
+  // All hands have shown this frame. Any thread.
+  void note_followed(Frame frame) { followed_.store(frame, std::memory_order_relaxed); }
   // Ends the loop at its next frame and waits for that.
   void stop();
   // After `ended` was called, or stop(), or start() never was.
   const LoopReport& report() const { return report_; }
 
+  // Returns simulated over real time, for the next tick. For start()'s thread, and for tests.
+  float rate() const;
   // One tick without pacing; true if it was the last. For start()'s thread, and for tests.
   bool run_tick();
 
@@ -123,6 +130,7 @@ class SimulationLoop {
   const std::function<void()> ended_;
   std::atomic<bool> is_stop_requested_{false}, is_snapshot_requested_{false};
   std::atomic<float> rate_{1};
+  std::atomic<Frame> followed_{0};
 
   // Simulation thread.
   std::optional<control::RateController> controller_;

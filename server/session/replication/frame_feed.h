@@ -51,6 +51,8 @@ class FrameFeed {
   void give_beside(const FrameEncoder& encoder, const wire::SharedBytes& message);
   bool was_given(Frame frame) const { return newest_given_ && frame <= *newest_given_; }
   void acknowledge(const FrameEncoder& encoder, Frame frame);
+  // Returns the newest frame that the client says it has; 0: none.
+  Frame acknowledged() const { return acknowledged_ ? acknowledged_->frame : 0; }
   // `received`: of our datagrams, as the client counts them.
   void hear(std::uint32_t received);
   bool uses_datagrams() const;

@@ -396,8 +396,20 @@ std::optional<Replicator::Ending> Replicator::handle_ack(Client& client,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
   client.feed.acknowledge(encoder_, frame);
   client.fine_parts.on_acknowledged(frame);
-  if (client.participant) note_answer(client.participant->slot, ack);
+  if (!client.participant) return std::nullopt;
+  note_answer(client.participant->slot, ack);
+  if (options_.on_followed && client.participant->slot.has_tools()) tell_followed();
   return std::nullopt;
+}
+
+void Replicator::tell_followed() {
+  auto followed = std::numeric_limits<Frame>::max();
+  for (const auto& who : roster_.list()) {
+    if (!who.slot.has_tools()) continue;
+    const auto* client = client_of(who.slot);
+    followed = std::min(followed, who.is_away || !client ? 0 : client->feed.acknowledged());
+  }
+  options_.on_followed(followed);
 }
 
 void Replicator::note_answer(ParticipantSlot slot, const proto::FrameAck& ack) {

@@ -219,6 +219,7 @@ class Replicator final : public net::ConnectionHandler {
   // Gives a newcomer what is drawn, and the view to follow; false: it does not fit.
   bool show_lesson(Client& client);
   std::optional<Ending> handle_ack(Client& client, const proto::FrameAck& ack);
+  void tell_followed();
   // Ends the session of who sends too much.
   std::optional<Ending> check_rate(Client& client, std::size_t bytes);
 

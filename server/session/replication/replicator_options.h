@@ -44,6 +44,9 @@ struct ReplicatorOptions {
   std::function<void(const std::string& words)> on_end_wanted;
   // Told how fast time is to go, simulated over real time, 0: not at all; empty: nobody can say.
   std::function<void(float rate)> on_pace;
+  // Told, whenever a hand has shown a frame, the newest that all hands have shown, 0: one of them
+  // shows none or is away; may be empty.
+  std::function<void(Frame)> on_followed;
   std::optional<lesson::Lesson> lesson;      // empty: the session gives none
   std::shared_ptr<lesson::Course> course;    // of a session that goes on; null: from the beginning
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
