@@ -7,23 +7,20 @@
 
 #include <atomic>
 #include <boost/asio/io_context.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
-#include <boost/beast/http.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <chrono>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "common/base/no_throw.h"
 #include "server/session/monitoring/http_acceptor.h"
+#include "server/session/monitoring/http_stream.h"
 
 namespace trocar::agones {
 namespace {
 
-namespace beast = boost::beast;
-namespace http = beast::http;
+namespace http = boost::beast::http;
 using std::chrono::milliseconds;
 
 // A sidecar answers {} to what it is told, and a description of the game server.
@@ -42,22 +39,23 @@ struct FakeSidecar {
 
   std::uint16_t open(std::uint16_t port = 0) {
     EXPECT_TRUE(acceptor->open("127.0.0.1", port, "test").ok());
-    acceptor->start([this](beast::tcp_stream stream) { return serve(std::move(stream)); },
+    acceptor->start([this](asio::ip::tcp::socket socket) { return serve(std::move(socket)); },
                     acceptor);
     return acceptor->port();
   }
 
-  asio::awaitable<void> serve(beast::tcp_stream stream) {
-    beast::flat_buffer buffer;
-    http::request<http::string_body> request;
-    const auto [failed, count] = co_await http::async_read(stream, buffer, request, kNoThrow);
+  asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
+    monitoring::HttpStream stream(std::move(socket), nullptr);
+    http::request_parser<http::string_body> parser;
+    const auto failed = co_await stream.read(parser);
     if (failed) co_return;
+    const auto& request = parser.get();
     const auto what = std::string(request.method_string()) + " " + std::string(request.target());
     if (what.starts_with("POST")) {
       EXPECT_EQ(request.body(), "{}");
     }
     EXPECT_EQ(request[http::field::content_type], "application/json");
-    http::response<http::string_body> answer(
+    monitoring::HttpResponse answer(
         refusals > 0 ? http::status::internal_server_error : http::status::ok, request.version());
     if (refusals > 0)
       --refusals;
@@ -66,9 +64,8 @@ struct FakeSidecar {
     answer.body() = what == "GET /gameserver" ? kGameServer : "{}";
     answer.keep_alive(false);
     answer.prepare_payload();
-    co_await http::async_write(stream, answer, kNoThrow);
-    beast::error_code ignored;
-    stream.socket().shutdown(asio::socket_base::shutdown_send, ignored);
+    co_await stream.write(answer);
+    stream.shut_down();
   }
 
   std::shared_ptr<Held> acceptor;

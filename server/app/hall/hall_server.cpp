@@ -4,12 +4,7 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/ssl/stream_base.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
-#include <boost/beast/http.hpp>
-#include <boost/beast/ssl/ssl_stream.hpp>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -24,14 +19,13 @@
 #include "server/session/access/audit_log.h"
 #include "server/session/monitoring/exposition.h"
 #include "server/session/monitoring/http_acceptor.h"
+#include "server/session/monitoring/http_stream.h"
 
 namespace trocar::app {
 namespace {
 
-namespace beast = boost::beast;
-namespace http = beast::http;
-using Request = http::request<http::string_body>;
-using Answer = http::response<http::string_body>;
+namespace http = boost::beast::http;
+using Request = monitoring::HttpRequest;
 
 constexpr std::chrono::milliseconds kEndPoll{100};
 constexpr std::uint64_t kWrongProofNoteNs = 1'000'000'000;
@@ -126,26 +120,19 @@ struct HallServer::Core {
     audit.write({.event = what, .name = name, .role = "", .address = peer, .reason = reason});
   }
 
-  asio::awaitable<void> serve(beast::tcp_stream stream) {
-    beast::error_code unknown;
-    const auto peer = stream.socket().remote_endpoint(unknown).address().to_string();
-    if (!tls) co_return co_await serve_on(stream, peer);
-    beast::ssl_stream<beast::tcp_stream> sealed(std::move(stream), *tls);
-    beast::get_lowest_layer(sealed).expires_after(kRequestDeadline);
-    const auto [failed] = co_await sealed.async_handshake(asio::ssl::stream_base::server, kNoThrow);
-    if (!failed) co_await serve_on(sealed, peer);
-  }
-
-  // The caller's objects outlive it: it is awaited at once.
-  template <typename Stream>
-  asio::awaitable<void> serve_on(Stream& stream, const std::string& peer) {
-    auto& connection = beast::get_lowest_layer(stream);
-    beast::flat_buffer buffer(kMostHeadBytes + hall::kMostRequestBytes);
+  asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
+    boost::system::error_code unknown;
+    const auto peer = socket.remote_endpoint(unknown).address().to_string();
+    monitoring::HttpStream stream(std::move(socket), tls);
+    stream.end_after(kRequestDeadline);
+    if (tls)
+      if (const auto failed = co_await stream.below().accept_tls()) co_return;
     http::request_parser<http::string_body> parser;
     parser.header_limit(kMostHeadBytes);
     parser.body_limit(hall::kMostRequestBytes);
-    connection.expires_after(kRequestDeadline);
-    const auto [failed, count] = co_await http::async_read(stream, buffer, parser, kNoThrow);
+    stream.end_after(kRequestDeadline);
+    const auto failed = co_await stream.read(parser);
+    stream.end_never();
     Reply given;
     if (failed == http::error::body_limit)
       given = refusal(http::status::payload_too_large, "the request is longer than 4096 bytes");
@@ -153,7 +140,7 @@ struct HallServer::Core {
       co_return;
     else
       given = co_await answer_to(parser.get(), peer);
-    Answer answer(given.status, parser.get().version());
+    monitoring::HttpResponse answer(given.status, parser.get().version());
     answer.keep_alive(false);
     answer.set(http::field::content_type, given.type);
     answer.set(http::field::cache_control, "no-store");
@@ -162,11 +149,9 @@ struct HallServer::Core {
       answer.set(http::field::www_authenticate, "Bearer");
     answer.body() = std::move(given.body);
     answer.prepare_payload();
-    connection.expires_after(kRequestDeadline);
-    const auto [unsent, bytes] = co_await http::async_write(stream, answer, kNoThrow);
-    if (unsent) co_return;
-    beast::error_code ignored;
-    connection.socket().shutdown(asio::socket_base::shutdown_send, ignored);
+    stream.end_after(kRequestDeadline);
+    const auto unsent = co_await stream.write(answer);
+    if (!unsent) stream.shut_down();
   }
 
   Trust trust_in(const Request& request) const {
@@ -297,7 +282,8 @@ Result<std::unique_ptr<HallServer>> HallServer::listen(asio::io_context& context
   if (const auto opened = core->acceptor.open(config.address, config.port, "listen"); !opened)
     return opened.error();
   core->acceptor.start(
-      [at = core.get()](beast::tcp_stream stream) { return at->serve(std::move(stream)); }, core);
+      [at = core.get()](asio::ip::tcp::socket socket) { return at->serve(std::move(socket)); },
+      core);
   return std::unique_ptr<HallServer>(new HallServer(core));
 }
 

@@ -5,16 +5,14 @@
 #include "common/base/asio.h"  // before Boost: see there
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/io_context.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
 
 namespace trocar::hall {
 
-// Returns the body of an answer with status 200 from 127.0.0.1, at most 256 KiB within 2 s; nothing
+// Returns the body of an answer with status 200 from 127.0.0.1, within 2 s; nothing
 // if there is none.
-asio::awaitable<std::optional<std::string>> get_page(asio::io_context& context, std::uint16_t port,
-                                                     std::string path);
+asio::awaitable<std::optional<std::string>> get_page(std::uint16_t port, std::string path);
 
 }  // namespace trocar::hall

@@ -413,11 +413,11 @@ void Sessions::finish(Session& session) {
 
 asio::awaitable<void> Sessions::probe(std::shared_ptr<Session> session) {
   const auto port = session->figures_port;
-  const auto ready = co_await get_page(context_, port, "/readyz");
+  const auto ready = co_await get_page(port, "/readyz");
   if (ready && session->state == SessionState::Starting && session->server && !is_stopping_)
     become_running(*session);
   if (session->state == SessionState::Running) {
-    const auto text = co_await get_page(context_, port, "/metrics");
+    const auto text = co_await get_page(port, "/metrics");
     if (text && session->state == SessionState::Running && session->server && !is_stopping_) {
       session->answered_at_s = now_s();
       session->figures = read_figures(*text);

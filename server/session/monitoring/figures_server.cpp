@@ -1,21 +1,17 @@
 #include "server/session/monitoring/figures_server.h"
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
-#include <boost/beast/http.hpp>
+#include <boost/beast/http/empty_body.hpp>
 
-#include "common/base/no_throw.h"
 #include "server/session/monitoring/exposition.h"
 #include "server/session/monitoring/http_acceptor.h"
+#include "server/session/monitoring/http_stream.h"
 
 namespace trocar::monitoring {
 namespace {
 
-namespace beast = boost::beast;
-namespace http = beast::http;
+namespace http = boost::beast::http;
 using Request = http::request<http::empty_body>;
-using Answer = http::response<http::string_body>;
 
 }  // namespace
 
@@ -26,22 +22,20 @@ struct FiguresServer::Core {
   Core(asio::io_context& context, FiguresAnswers given)
       : answers(std::move(given)), acceptor(context, kMostConnections) {}
 
-  asio::awaitable<void> serve(beast::tcp_stream stream) {
-    beast::flat_buffer buffer(2 * kMostHeaderBytes);
+  asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
+    HttpStream stream(std::move(socket), nullptr);
+    stream.end_after(kDeadline);
     http::request_parser<http::empty_body> parser;
     parser.header_limit(kMostHeaderBytes);
-    stream.expires_after(kDeadline);
-    const auto [failed, count] = co_await http::async_read_header(stream, buffer, parser, kNoThrow);
+    const auto failed = co_await stream.read(parser, true);
     if (failed || acceptor.is_stopping()) co_return;
-    const Answer answer = answer_to(parser.get());
-    const auto [unsent, bytes] = co_await http::async_write(stream, answer, kNoThrow);
-    if (unsent) co_return;
-    beast::error_code ignored;
-    stream.socket().shutdown(asio::socket_base::shutdown_send, ignored);
+    const auto answer = answer_to(parser.get());
+    const auto unsent = co_await stream.write(answer);
+    if (!unsent) stream.shut_down();
   }
 
-  Answer answer_to(const Request& request) const {
-    Answer answer;
+  HttpResponse answer_to(const Request& request) const {
+    HttpResponse answer;
     answer.version(request.version());
     answer.keep_alive(false);
     answer.set(http::field::content_type, "text/plain; charset=utf-8");
@@ -52,7 +46,7 @@ struct FiguresServer::Core {
     return answer;
   }
 
-  void fill(const Request& request, Answer& answer) const {
+  void fill(const Request& request, HttpResponse& answer) const {
     if (request.method() != http::verb::get) {
       answer.result(http::status::method_not_allowed);
       answer.set(http::field::allow, "GET");
@@ -71,7 +65,7 @@ struct FiguresServer::Core {
     answer.body() = "There are /healthz, /readyz and /metrics.\n";
   }
 
-  static void say(Answer& answer, const std::string& trouble) {
+  static void say(HttpResponse& answer, const std::string& trouble) {
     if (!trouble.empty()) answer.result(http::status::service_unavailable);
     answer.body() = (trouble.empty() ? "ok" : trouble) + "\n";
   }
@@ -89,7 +83,8 @@ Result<std::unique_ptr<FiguresServer>> FiguresServer::listen(asio::io_context& c
   if (const auto opened = core->acceptor.open(address, port, "--metrics"); !opened)
     return opened.error();
   core->acceptor.start(
-      [at = core.get()](beast::tcp_stream stream) { return at->serve(std::move(stream)); }, core);
+      [at = core.get()](asio::ip::tcp::socket socket) { return at->serve(std::move(socket)); },
+      core);
   return std::unique_ptr<FiguresServer>(new FiguresServer(core));
 }
 

@@ -10,7 +10,6 @@
 namespace trocar::monitoring {
 namespace {
 
-namespace beast = boost::beast;
 using tcp = asio::ip::tcp;
 
 constexpr std::chrono::milliseconds kAcceptRetry{200};
@@ -56,7 +55,7 @@ asio::awaitable<void> HttpAcceptor::accept(Serve serve, std::shared_ptr<void> ow
     }
     if (open_ >= most_connections_) continue;  // closes it
     ++open_;
-    asio::co_spawn(context_, serve(beast::tcp_stream(std::move(socket))),
+    asio::co_spawn(context_, serve(std::move(socket)),
                    [this, owner](const std::exception_ptr& failure) {
                      --open_;
                      rethrow(failure);

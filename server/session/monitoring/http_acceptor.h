@@ -10,7 +10,6 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <functional>
 #include <memory>
 #include <string>
@@ -21,7 +20,7 @@ namespace trocar::monitoring {
 
 class HttpAcceptor {
  public:
-  using Serve = std::function<asio::awaitable<void>(boost::beast::tcp_stream)>;
+  using Serve = std::function<asio::awaitable<void>(asio::ip::tcp::socket)>;
 
   HttpAcceptor(asio::io_context& context, std::size_t most_connections)
       : context_(context), acceptor_(context), most_connections_(most_connections) {}
