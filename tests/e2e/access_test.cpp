@@ -24,11 +24,15 @@ class Access : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = test_folder();
+    if (const char* before = std::getenv("XDG_RUNTIME_DIR")) runtime_before_ = before;
     ::setenv("XDG_RUNTIME_DIR", (folder_ / "run").c_str(), 1);
     fs::create_directories(folder_ / "run");
   }
   void TearDown() override {
-    ::unsetenv("XDG_RUNTIME_DIR");
+    if (runtime_before_.empty())
+      ::unsetenv("XDG_RUNTIME_DIR");
+    else
+      ::setenv("XDG_RUNTIME_DIR", runtime_before_.c_str(), 1);
     fs::remove_all(folder_);
   }
 
@@ -59,7 +63,7 @@ class Access : public ::testing::Test {
   Invitation invitation(const std::string& role) const { return find_invitation(log(), role); }
 
   fs::path folder_;
-  std::string port_;
+  std::string port_, runtime_before_;
 };
 
 TEST_F(Access, PrintedCodesAndLinksLetInAndOthersDoNot) {

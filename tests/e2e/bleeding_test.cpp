@@ -9,7 +9,7 @@ namespace trocar::e2e {
 namespace {
 
 TEST(BleedingSession, EverybodyHasTheSameBloodAndTheRecordingIsVerified) {
-  Session session("liver", {"--bleeding", "--seconds", "10"});
+  Session session("liver", at_pace(3, {"--bleeding", "--seconds", "10"}));
   auto scalpel = session.hand("Scalpel", kScenes / "incise.toml");
   auto suction = session.hand("Suction", kScenes / "suck.toml");
   auto by_stream = session.client("Stream", "observer", {"--no-datagrams"});

@@ -65,10 +65,11 @@ void assess(const std::filesystem::path& file, Played& played) {
   }
 }
 
-// Plays a lesson until so many stages are over, or for so many seconds.
+// Plays a lesson until so many stages are over, or for so many simulated seconds.
 Played play(const std::string& lesson, const std::vector<Hand>& hands, int stages, int seconds,
             const std::vector<std::string>& extra = {}, const std::string& organ = "liver") {
-  Session session(organ, {"--lesson", lesson});
+  Session session(organ, at_pace(static_cast<int>(hands.size()),
+                                 {"--lesson", lesson, "--seconds", std::to_string(seconds)}));
   std::vector<Program> clients;
   for (const auto& hand : hands) {
     std::vector<std::string> arguments{"--script", kHands / (hand.script + ".toml"), "--no-render"};
@@ -82,9 +83,9 @@ Played play(const std::string& lesson, const std::vector<Hand>& hands, int stage
         for (auto at = log.find(" points"); at != std::string::npos;
              at = log.find(" points", at + 1))
           over += log.compare(at - 4, 4, " 100") == 0;
-        return over >= stages;
+        return over >= stages || !session.server().is_running();
       },
-      seconds);
+      300);
   session.server().signal(SIGTERM);
   EXPECT_EQ(session.server().wait(30), 0);
   for (auto& client : clients) client.wait(30);
@@ -105,7 +106,7 @@ TEST(Lessons, WhoFeelsTheLumpFindsIt) {
   EXPECT_GT(well.results[0].points(), 90);
   EXPECT_EQ(well.answers, 1);
   EXPECT_EQ(well.measure(0, "wrong_answers"), 0);
-  const auto badly = play("find-the-lump", {{"Anna", "find-badly"}}, 1, 14, {"--answer-at", "8"});
+  const auto badly = play("find-the-lump", {{"Anna", "find-badly"}}, 1, 10, {"--answer-at", "8"});
   EXPECT_TRUE(badly.results.empty());
   EXPECT_EQ(badly.answers, 1);
   EXPECT_EQ(badly.assessed["stages"][0]["moments"][0]["text"], "gave a wrong answer");
@@ -116,7 +117,7 @@ TEST(Lessons, WhoKeepsOnThePointFollowsIt) {
   ASSERT_EQ(well.results.size(), 1u);
   EXPECT_TRUE(well.results[0].is_reached());
   EXPECT_GT(well.results[0].points(), 90);
-  EXPECT_TRUE(play("follow-the-point", {{"Anna", "follow-badly"}}, 1, 16).results.empty());
+  EXPECT_TRUE(play("follow-the-point", {{"Anna", "follow-badly"}}, 1, 13).results.empty());
 }
 
 TEST(Lessons, WhoCutsAlongTheLineReachesItsEnd) {
@@ -124,7 +125,7 @@ TEST(Lessons, WhoCutsAlongTheLineReachesItsEnd) {
   ASSERT_EQ(well.results.size(), 1u);
   EXPECT_TRUE(well.results[0].is_reached());
   EXPECT_GT(well.results[0].points(), 60);
-  EXPECT_TRUE(play("along-the-line", {{"Anna", "incise-badly"}}, 1, 16).results.empty());
+  EXPECT_TRUE(play("along-the-line", {{"Anna", "incise-badly"}}, 1, 11).results.empty());
 }
 
 TEST(Lessons, WhoPullsGentlyGetsMorePoints) {
@@ -192,12 +193,10 @@ TEST(Lessons, HiddenStructuresAreInNoMessage) {
                          "radius_mm = 14\n"
                          "[[stage]]\nname = \"S\"\ntext = \"t\"\ngoal = \"find\"\n"
                          "structure = \"zebra\"\nlimit_s = 2\n";
-  Session session("liver", {"--lesson", file});
+  Session session("liver", at_pace(1, {"--lesson", file, "--seconds", "5"}));
   auto client =
       session.client("Anna", "surgeon", {"--script", kHands / "find-well.toml", "--no-render"});
-  EXPECT_TRUE(session.wait_for_tick(5000));
-  session.server().signal(SIGTERM);
-  EXPECT_EQ(session.server().wait(30), 0);
+  EXPECT_EQ(session.server().wait(300), 0);
   client.wait(30);
   auto journal = journal::SessionJournal::open(session.journal);
   ASSERT_TRUE(journal.ok());

@@ -79,6 +79,11 @@ std::string ready_address(const fs::path& ready_file) {
   return "127.0.0.1:" + port.substr(port.rfind(':') + 1);
 }
 
+std::vector<std::string> at_pace(int people, std::vector<std::string> more) {
+  more.insert(more.end(), {"--wait-for", std::to_string(people), "--pace", "10"});
+  return more;
+}
+
 namespace {
 
 std::vector<std::string> server_arguments(const fs::path& folder, const fs::path& journal,

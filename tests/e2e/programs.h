@@ -36,6 +36,10 @@ std::string ready_address(const std::filesystem::path& ready_file);
 inline const std::filesystem::path kScenes =
     std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
 
+// Options of a server whose hands are scripts: its time begins when so many people are there, and
+// goes as fast as the hands follow. So a session does not depend on what else the machine does.
+std::vector<std::string> at_pace(int people, std::vector<std::string> more = {});
+
 // A server on a free port and clients of it, all logging into test_folder().
 class Session {
  public:

@@ -69,9 +69,8 @@ std::vector<TraceRow> read_trace(const fs::path& file) {
   return rows;
 }
 
-// The recording of Anna's press.
 fs::path record_press() {
-  Session session("liver", {"--seconds", "9"});
+  Session session("liver", at_pace(1, {"--seconds", "9"}));
   auto anna = session.hand("Anna", write_press(session.folder));
   EXPECT_EQ(session.server().wait(120), 0) << read_text(session.folder / "server.log");
   EXPECT_EQ(anna.wait(20), 0) << read_text(session.folder / "Anna.log");
@@ -79,6 +78,12 @@ fs::path record_press() {
   fs::rename(session.journal, kept);
   fs::remove(session.folder / "ready");  // another session may follow in this folder
   return kept;
+}
+
+// The recording of Anna's press, of which there is one.
+const fs::path& recorded_press() {
+  static const fs::path file = record_press();
+  return file;
 }
 
 double greatest_force_n(const replay::RecordedHand& hand) {
@@ -89,7 +94,7 @@ double greatest_force_n(const replay::RecordedHand& hand) {
 }
 
 TEST(RecordedHandInUse, DoesInAnotherSessionWhatItDid) {
-  const auto expert = record_press();
+  const auto& expert = recorded_press();
   const auto recorded = replay::read_recorded_hand(expert.string(), "Anna", 0);
   ASSERT_TRUE(recorded.ok()) << recorded.error().message;
   ASSERT_GT(greatest_force_n(*recorded), 0.2);
@@ -120,7 +125,7 @@ TEST(RecordedHandInUse, DoesInAnotherSessionWhatItDid) {
 }
 
 TEST(RecordedHandInUse, AHandThatIsNotThereIsAnErrorInOneLine) {
-  const auto expert = record_press();
+  const auto& expert = recorded_press();
   const auto folder = test_folder();
   Program client("trocar-client",
                  {"--no-render", "--device", "journal:" + expert.string() + ",name=Ben"},
@@ -132,7 +137,7 @@ TEST(RecordedHandInUse, AHandThatIsNotThereIsAnErrorInOneLine) {
 }
 
 TEST(RecordedHandInUse, ALearnerFeelsWhatTheExpertFelt) {
-  const auto expert = record_press();
+  const auto& expert = recorded_press();
   const auto recorded = replay::read_recorded_hand(expert.string(), "Anna", 0);
   ASSERT_TRUE(recorded.ok()) << recorded.error().message;
   const auto folder = test_folder();

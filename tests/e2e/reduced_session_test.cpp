@@ -184,7 +184,8 @@ TEST(ReducedSession, GoesOnWithItsReductionAfterTheServerWasKilled) {
   std::vector<std::string> arguments{"--resume",  session.journal.string(),
                                      "--listen",  session.address(),
                                      "--journal", next,
-                                     "--seconds", "4"};
+                                     "--seconds", "4",
+                                     "--pace",    "10"};
   const auto [refused, why] = outcome("trocar-server", arguments, folder);
   EXPECT_EQ(refused, 2);
   EXPECT_NE(why.find("was recorded with the reduction block.reduction"), std::string::npos) << why;

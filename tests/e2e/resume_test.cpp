@@ -3,11 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <csignal>
 #include <fstream>
 #include <limits>
-#include <thread>
 
 #include "common/base/json.h"
 #include "common/journal/session_journal.h"
@@ -41,7 +39,7 @@ class Resume : public ::testing::Test {
     EXPECT_EQ(session_.server().wait(10), 128 + SIGKILL);
   }
 
-  Session session_{"elastic-liver"};
+  Session session_{"elastic-liver", {"--pace", "10"}};
   fs::path next_ = session_.folder / "next.mcap", log_ = session_.folder / "next.log";
 };
 
@@ -50,7 +48,7 @@ TEST_F(Resume, AKilledServersSessionGoesOnAndEverybodyComesBack) {
   auto watcher = session_.client("Watcher", "observer");
   ASSERT_TRUE(session_.wait_for_tick(11'000)) << "so that there is a snapshot after the first cuts";
   kill_server();
-  auto server = resume();
+  auto server = resume({"--pace", "10"});
   ASSERT_TRUE(wait_until(
       [&] {
         const auto text = read_text(log_);
@@ -65,7 +63,12 @@ TEST_F(Resume, AKilledServersSessionGoesOnAndEverybodyComesBack) {
   const auto before = journal({"verify", session_.journal.string(), "--json"}, 6);
   EXPECT_NE(said.find("state hash " + json_value(before, "last_hash")), std::string::npos)
       << before;
-  std::this_thread::sleep_for(std::chrono::seconds(3));
+  const auto last_tick = [](const fs::path& file) {
+    const auto recorded = journal::SessionJournal::open(file.string());
+    return recorded.ok() ? (*recorded)->info().last_tick : 0;
+  };
+  const Tick back = last_tick(next_);
+  EXPECT_TRUE(wait_until([&] { return last_tick(next_) >= back + 3000; }, 60));
   server.signal(SIGTERM);
   ASSERT_EQ(server.wait(30), 0);
   const auto summary = read_text(session_.folder / "next.json");

@@ -62,7 +62,7 @@ void expect_replay_equals(const std::filesystem::path& file,
 }
 
 void run_shared_session(const std::string& organ) {
-  Session session(organ, {"--seconds", "12"});
+  Session session(organ, at_pace(3, {"--seconds", "12"}));
   auto lift = session.hand("Lift", kScenes / "lift.toml");
   auto press = session.hand("Press", kScenes / "press.toml");
   auto instructor = session.client("Instructor", "instructor");
@@ -126,7 +126,7 @@ void expect_verified(const std::filesystem::path& journal, std::uint64_t least_t
 // Two blades at two places, an assistant who draws one wound open, somebody who comes in the
 // middle, and a watcher whose picture breaks once and heals.
 TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
-  Session session("liver", {"--seconds", "9"});
+  Session session("liver", at_pace(4, {"--seconds", "9"}));
   auto incise = session.hand("Incise", kScenes / "incise.toml");
   auto retract = session.hand("Retract", kScenes / "retract.toml");
   auto slices = session.hand("Slices", kScenes / "slices.toml");
@@ -152,7 +152,7 @@ TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
 
 // The instructor marks the organ, two hands cut it, and he returns it to the mark.
 TEST(SharedSession, AReturnToTheMarkIsTheSameForEverybodyAndInTheRecording) {
-  Session session("liver", {"--seconds", "9"});
+  Session session("liver", at_pace(3, {"--seconds", "9"}));
   auto instructor = session.client("Teacher", "instructor", {"--mark-at", "1", "--return-at", "5"});
   auto incise = session.hand("Incise", kScenes / "incise.toml");
   auto watcher = session.client("Watcher", "observer");
@@ -165,7 +165,6 @@ TEST(SharedSession, AReturnToTheMarkIsTheSameForEverybodyAndInTheRecording) {
     EXPECT_EQ(json_value(summary, "own_crc"), json_value(server, "surface_crc")) << name;
     EXPECT_EQ(json_number(summary, "marks"), 2) << name;
     EXPECT_EQ(json_number(summary, "change_mismatches"), 0) << name;
-    // Scripts go by the clock: where the session cannot keep up, the blade has less time in it.
     EXPECT_GT(json_number(summary, "surface_changes"), 3) << name;
   }
   expect_verified(session.journal, 9'000);
@@ -175,7 +174,7 @@ TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
   Session session("liver", {"--return-seconds", "2"});
   auto lift = session.hand("Lift", kScenes / "lift.toml");
   auto observer = session.client("Observer", "observer");
-  ASSERT_TRUE(session.wait_for_tick(6000));
+  ASSERT_TRUE(session.wait_for_tick(2500));
   session.server().signal(SIGKILL);
   EXPECT_EQ(session.server().wait(10), 128 + SIGKILL);
   EXPECT_EQ(observer.wait(20), 5) << "the session was lost";

@@ -157,7 +157,7 @@ TEST(Datagrams, blocked_midway_the_stream_takes_over_and_they_return) {
   ASSERT_TRUE(play(guarded, trainee, 2000, [&] { return counters.by_datagram >= 50; }));
   const auto by_stream = counters.frames - counters.by_datagram;
   ASSERT_TRUE(play(guarded, trainee, 2000, [&] {
-    return counters.frames - counters.by_datagram >= by_stream + 100;
+    return counters.frames - counters.by_datagram >= by_stream + 40;
   })) << "the stream has taken over";
   const auto by_datagram = counters.by_datagram;
   ASSERT_TRUE(play(guarded, trainee, 4000, [&] {

@@ -45,7 +45,7 @@ void expect_session(const std::vector<std::string>& import_arguments) {
   ASSERT_EQ(import.wait(120), 0) << read_text(folder / "import.log");
   const auto organ = organ::read_organ(path);
   ASSERT_TRUE(organ.ok()) << organ.error().message;
-  Session session(path.string(), {"--seconds", "4"});
+  Session session(path.string(), at_pace(1, {"--seconds", "4"}));
   auto hand = session.hand("Ada", press_script(folder, *organ));
   EXPECT_EQ(session.server().wait(120), 0);
   EXPECT_NE(hand.wait(60), -1);

@@ -1,6 +1,11 @@
 // Tests what a new user meets in the first five minutes: help, an import with the wrong unit, a
 // client that is started before its server, an example that is at rest.
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -117,6 +122,21 @@ TEST_F(Server, HelpHasTheTrainersOptionsFirstAndTheSolversLast) {
 class Client : public testing::ProgramFixture {
  protected:
   Client() : ProgramFixture("trocar-client") {}
+
+  // Nobody listens there, and nobody is given this port who asks for any.
+  static std::string free_address() {
+    for (int port = 20'000 + getpid() % 10'000;; ++port) {
+      sockaddr_in address{};
+      address.sin_family = AF_INET;
+      address.sin_port = htons(static_cast<std::uint16_t>(port));
+      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+      const bool is_free =
+          ::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+      ::close(socket);
+      if (is_free) return "127.0.0.1:" + std::to_string(port);
+    }
+  }
 };
 
 class SecondProgram : public testing::ProgramFixture {
@@ -128,7 +148,7 @@ class SecondProgram : public testing::ProgramFixture {
 };
 
 TEST_F(Client, WaitsForAServerThatIsStartedAfterIt) {
-  const std::string address = "127.0.0.1:" + std::to_string(20'000 + getpid() % 20'000);
+  const std::string address = free_address();
   start(
       {"--server", address, "--no-render", "--name", "Early", "--wait", "60", "--seconds", "0.2"});
   // It has tried and said so before there is a server.
@@ -142,8 +162,8 @@ TEST_F(Client, WaitsForAServerThatIsStartedAfterIt) {
 }
 
 TEST_F(Client, GivesUpAfterTheTimeThatItWasGiven) {
-  const std::string address = "127.0.0.1:" + std::to_string(40'001 + getpid() % 20'000);
-  EXPECT_EQ(run({"--server", address, "--no-render", "--name", "Alone", "--wait", "0.3"}), 5);
+  EXPECT_EQ(run({"--server", free_address(), "--no-render", "--name", "Alone", "--wait", "0.3"}),
+            5);
   EXPECT_NE(log().find("start trocar-server"), std::string::npos) << log();
 }
 

@@ -60,7 +60,7 @@ class RelayPrograms : public ::testing::Test {
     }
   }
 
-  Session session_{"lattice"};
+  Session session_{"lattice", {"--pace", "10"}};
 };
 
 TEST_F(RelayPrograms, watchers_of_a_relay_show_what_the_hands_did) {
@@ -159,8 +159,8 @@ TEST_F(RelayPrograms, a_session_that_goes_on_goes_on_for_the_watchers_of_its_rel
   session_.server().signal(SIGKILL);
   EXPECT_EQ(session_.server().wait(10), 128 + SIGKILL);
   Program server("trocar-server",
-                 {"--resume", session_.journal.string(), "--listen", session_.address(),
-                  "--journal", (session_.folder / "next.mcap").string(), "--summary",
+                 {"--resume", session_.journal.string(), "--listen", session_.address(), "--pace",
+                  "10", "--journal", (session_.folder / "next.mcap").string(), "--summary",
                   (session_.folder / "server.json").string()},
                  session_.folder / "server.log");
   ASSERT_TRUE(says("Relay", "back in the session"));
