@@ -139,7 +139,7 @@ void Run::measure(std::uint64_t now_ns) {
   last_change_us_ = change_us;
 }
 
-// What is done by itself goes by simulated time, as scripts do.
+// A client does this by itself, by simulated time as scripts do.
 void Run::use_marks() {
   if (live_ns_ == 0 || replica_.newest() == nullptr) return;
   const Tick newest = replica_.newest()->tick;

@@ -30,12 +30,12 @@ class HttpStream {
  public:
   // `tls` null: without TLS.
   HttpStream(asio::ip::tcp::socket socket, const secure::TlsContext& tls);
-  // What is still under way after this span is ended with an error: timed_out. It replaces the
-  // deadline before.
+  // An operation that is still under way after this span ends with an error, timed_out. The span
+  // replaces the one before.
   void end_after(std::chrono::steady_clock::duration span);
   void end_never();
 
-  // Of this stream until its own coroutine ends: for the handshake, and to connect.
+  // The stream below, to connect and for the handshake; it lasts as long as this one.
   secure::Stream& below();
 
   // Until the parser has the whole message, or only its header.
