@@ -9,14 +9,17 @@
 #            an option that no program or script has
 #   keys     docs/scripts-and-scenarios.md has exactly the keys that the sources read
 #
-# Each fault is one line on stdout; the exit code is 1 if there is any.
+# Each fault is one line on stdout; the exit code is 1 if there is any. What --help says is asked once, and kept
+# in the folder $HELP_TEXTS if several checks follow each other.
 set -uo pipefail
 export LC_ALL=C.UTF-8
 
 check=${1:?check} root=$(cd "${2:?root of the repository}" && pwd) bin=${3:+$(cd "$3" && pwd)}
 cd "$root" || exit 2
-faults=$(mktemp)
-trap 'rm -f "$faults"' EXIT
+work=$(mktemp -d)
+faults=$work/faults texts=${HELP_TEXTS:-$work}
+: >"$faults"
+trap 'rm -rf "$work"' EXIT
 fault() { printf '%s\n' "$*" >>"$faults"; }
 
 pages=(README.md CONTRIBUTING.md docs/*.md)
@@ -92,6 +95,11 @@ check_style() {
   done
 }
 
+help_of() { # PROGRAM [COMMAND]
+  local text=$texts/${1##*/}${2:+-$2}.help
+  [ -e "$text" ] || "$@" --help >"$text" 2>/dev/null || { rm -f "$text"; return 1; }
+  cat "$text"
+}
 # The options that a --help text on stdin names, one per line: those that begin a line.
 options_of_help() { grep -oE '^ {2,}(-[a-z], ?)?--[a-z][a-z0-9-]*' | grep -oE -- '--[a-z][a-z0-9-]*' | sort -u; }
 # The options in the first cells of the tables below a heading of docs/programs.md.
@@ -103,7 +111,7 @@ options_of_section() {
 check_section() { # HEADING COMMAND...
   local heading=$1 line help
   shift
-  help=$("$@" --help 2>/dev/null | sed '/^Examples:/,$d') || fault "$*: has no --help"
+  help=$(help_of "$@" | sed '/^Examples:/,$d') || fault "$*: has no --help"
   while read -r line; do
     fault "docs/programs.md: '$heading' does not have $line, which $(basename "$1")${2:+ $2} has"
   done < <(comm -13 <(options_of_section "$heading") <(options_of_help <<<"$help"))
@@ -118,15 +126,15 @@ check_options() {
   for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor; do
     [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
-    "$bin/$program" --help | options_of_help >>"$known"
-    for sub in $("$bin/$program" --help | awk '/^Subcommands:|^SUBCOMMANDS:/ {f = 1; next} /^[^ ]/ {f = 0} f && /^  [a-z]/ {print $1}'); do
+    help_of "$bin/$program" | options_of_help >>"$known"
+    for sub in $(help_of "$bin/$program" | awk '/^Subcommands:|^SUBCOMMANDS:/ {f = 1; next} /^[^ ]/ {f = 0} f && /^  [a-z]/ {print $1}'); do
       check_section "### $program $sub" "$bin/$program" "$sub"
-      "$bin/$program" "$sub" --help | options_of_help >>"$known"
+      help_of "$bin/$program" "$sub" | options_of_help >>"$known"
     done
   done
   for program in deploy/*; do
     [ -f "$program" ] && [ -x "$program" ] || continue
-    "./$program" --help | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
+    help_of "./$program" | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
   # Of cmake, systemctl, podman and bench_crowd.
   printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"

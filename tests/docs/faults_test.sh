@@ -6,6 +6,8 @@ root=$(cd "$1" && pwd) bin=$(cd "$2" && pwd)
 copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 failed=0
+export HELP_TEXTS=$copy/help
+mkdir "$HELP_TEXTS"
 
 fresh() {
   rm -rf "$copy/docs"
