@@ -14,11 +14,14 @@ constexpr unsigned kOk = 200;
 }  // namespace
 
 asio::awaitable<std::optional<std::string>> get_page(std::uint16_t port, std::string path) {
-  auto answer = co_await monitoring::ask({.host = "127.0.0.1",
-                                          .port = port,
-                                          .method = "GET",
-                                          .path = std::move(path),
-                                          .deadline = kProbeDeadline});
+  // It has a name: gcc 12 destroys twice what is made in braces where a coroutine waits.
+  monitoring::HttpQuestion question;
+  question.host = "127.0.0.1";
+  question.port = port;
+  question.method = "GET";
+  question.path = std::move(path);
+  question.deadline = kProbeDeadline;
+  auto answer = co_await monitoring::ask(std::move(question));
   if (!answer || answer->status != kOk) co_return std::nullopt;
   co_return std::move(answer->body);
 }
