@@ -100,7 +100,7 @@ class Instructor final : public replica::MessageSink {
 };
 
 TEST(Handover, TissueStaysHeldWhileItsInstrumentChangesHands) {
-  Session session("elastic-liver", at_pace(1));
+  Session session("elastic-liver");
   auto anna = session.hand("Anna", write_script(session.folder, "anna", 0, "grasp"));
   const auto is_granted = [&](std::uint32_t tool) {
     return find(grasps(session.journal), tool, proto::CLAIM_GRANTED) != nullptr;

@@ -270,7 +270,8 @@ def main() -> None:
         print(f"\ndeploy/test: ended by {signal.Signals(number).name}", file=sys.stderr)
         os._exit(128 + number)
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    # Those that the caller ignores would be ignored by tests, too.
+    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, interrupted)
     if shutil.which("ccache"):
         subprocess.run(["ccache", "-z"], stdout=subprocess.DEVNULL)

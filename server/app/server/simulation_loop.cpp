@@ -13,6 +13,7 @@ namespace {
 constexpr Tick kSnapshotPeriod = 10'000;
 constexpr Tick kSnapshotPhase = kTicksPerFrame / 2;
 constexpr unsigned long kTimerSlackNs = 1000;
+constexpr std::size_t kMostQueuedBytes = 256 * 1024;  // of a recording, faster than real time
 constexpr std::uint64_t kPauseNapNs = 5'000'000;
 // One frame is on its way to the hands while the next is computed.
 constexpr Frame kFramesAhead = 2;
@@ -139,7 +140,9 @@ float SimulationLoop::rate() const {
   const Frame followed = followed_.load(std::memory_order_relaxed);
   const bool is_followed =
       followed > 0 && simulation_.current_tick() <= kTicksPerFrame * (followed + kFramesAhead);
-  return rate_.load(std::memory_order_relaxed) * (is_followed ? options_.pace : 1);
+  // A recorder that does not follow would leave frames out.
+  const bool is_recorded = journal_ == nullptr || journal_->queued_bytes() <= kMostQueuedBytes;
+  return rate_.load(std::memory_order_relaxed) * (is_followed && is_recorded ? options_.pace : 1);
 }
 
 bool SimulationLoop::run_tick() {
