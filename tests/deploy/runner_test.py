@@ -104,7 +104,7 @@ class Running(unittest.TestCase):
 
     def test_a_long_program_is_run_in_parts_that_together_are_the_whole(self):
         tests = {f"A.T{i}": "ok" for i in range(7)}
-        results, jobs = self.run_all(self.program("p", tests, cost=100))
+        results, jobs = self.run_all(self.program("p", tests, cost=1300))
         self.assertEqual(len(jobs), 3)
         self.assertEqual({name.removeprefix("p:") for name in results}, set(tests))
 

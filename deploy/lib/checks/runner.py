@@ -17,7 +17,7 @@ from .progress import Progress
 BEGIN = re.compile(r"\[ RUN      \] (\S+)$")
 END = re.compile(r"\[ {2}(?:     OK|FAILED|SKIPPED) {0,1} \] (\S+?)(?:, where .*)? \((\d+) ms\)$")
 LISTED = re.compile(r"^( *)([^ #]+)")
-SHARD_SECONDS = 45  # a program that takes longer is run as several processes
+SHARD_SECONDS = 600  # a program that takes longer is run as several processes
 OUTPUT_LINES = 60  # shown of a test that fails
 
 
