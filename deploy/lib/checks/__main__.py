@@ -203,8 +203,8 @@ class Check:
         """False where no test of this name can match: then it need not be built."""
         if test.kind == "script":
             return bool(re.search(self.options.filter, test.name))
-        # The name of a program begins the name of its tests; anything else is known once it is built.
-        words = re.match(r"^\^?(\w+)\\?\.", self.options.filter)
+        # A name from its beginning on is that of a program; others are known once it is built.
+        words = re.fullmatch(r"\^(\w+)\\?\.[^|]*", self.options.filter)
         return not words or words[1] in test.name
 
     def headers(self, plan: Plan, tests: list[Test], is_whole: bool) -> None:
