@@ -24,7 +24,7 @@ FUZZ_SECONDS = 3  # for each reader of outside data; deploy/campaign fuzz gives 
 USAGE = """deploy/test [--yes] [--all | --with-node | --with-web | --with-clang] [--changed BASE]
                    [--filter REGEX] [--campaign] [--out DIR]"""
 HELP = """Sets up, builds and tests. The last line says "N passed, N failed"; the exit code is 0 only if nothing
-failed. Reports go to ./out/test: JUnit XML, the logs of what failed, times.tsv with the seconds of each test."""
+failed. Reports go to ./out/test: JUnit XML, the logs of what failed, and release-times.tsv with the seconds of each test."""
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:

@@ -8,7 +8,6 @@ import tempfile
 import threading
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from .plan import Test
 from .progress import Progress
