@@ -122,7 +122,31 @@ bool McapReader::open_summary() {
     return false;
   }
   is_finished_ = true;
+  summary_start_ = footer->summary_start;
   return true;
+}
+
+Status McapReader::check_data_crc() const {
+  constexpr std::uint64_t kPieceBytes = 1 << 20, kDataEndBytes = kRecordHeaderBytes + 4;
+  if (!is_finished_) return {};
+  if (summary_start_ < data_start_ + kDataEndBytes)
+    return damaged(summary_start_, "no end of the data before the summary");
+  const std::uint64_t end_at = summary_start_ - kDataEndBytes;
+  const auto end = read_bytes(end_at, kDataEndBytes);
+  if (!end.ok()) return end.error();
+  if (record_header(*end).opcode != Opcode::DataEnd || record_header(*end).length != 4)
+    return damaged(end_at, "no end of the data before the summary");
+  ByteReader reader(BytesView(*end).subspan(kRecordHeaderBytes));
+  const auto expected = reader.read<std::uint32_t>();
+  if (expected == 0) return {};
+  std::uint32_t crc = 0;
+  for (std::uint64_t at = 0; at < end_at; at += kPieceBytes) {
+    const auto piece = read_bytes(at, std::min(kPieceBytes, end_at - at));
+    if (!piece.ok()) return piece.error();
+    crc = crc32(*piece, crc);
+  }
+  if (crc != expected) return damaged(end_at, "the CRC of all data does not match");
+  return {};
 }
 
 bool McapReader::read_summary_record(const RecordView& record, std::uint64_t summary_start) {

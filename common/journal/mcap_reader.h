@@ -71,6 +71,10 @@ class McapReader {
   // reported and skipped, the others are still read.
   ReadReport read(const ChannelFilter& filter, const TimeRange& range,
                   const MessageVisitor& visitor);
+  // Compares the file's bytes with the CRC of its data section, which also covers what read() does not
+  // need: indexes, metadata, records outside chunks. Ok if there is none: the file has no end, or its
+  // writer gave no CRC. Reads the whole file.
+  Status check_data_crc() const;
   // The last message on `topic` at or before `time`. Nothing if there is none; an error if the
   // chunk that should hold it is damaged.
   Result<std::unique_ptr<OwnedMessage>> last_before(std::string_view topic, std::uint64_t time);
@@ -111,6 +115,7 @@ class McapReader {
   std::vector<McapChunkIndex> chunks_;
   McapStatistics statistics_;
   bool is_finished_ = false;
+  std::uint64_t summary_start_ = 0;  // of a finished file
   std::uint64_t dropped_bytes_ = 0;
   SharedChunk last_chunk_;
 };

@@ -121,6 +121,19 @@ TEST_F(mcap_damage, flipped_bit_in_a_chunk_is_reported_and_the_others_are_read) 
   }
 }
 
+TEST_F(mcap_damage, no_flipped_bit_anywhere_goes_unnoticed) {
+  ASSERT_TRUE(reopen(file_)->check_data_crc().ok());
+  for (std::size_t at = 0; at < file_.size(); at += 61) {
+    Bytes bytes = file_;
+    bytes[at] ^= 0x20;
+    save_file(path_, bytes);
+    auto reader = McapReader::open(path_);
+    const bool is_noticed =
+        !reader.ok() || !(*reader)->is_finished() || !(*reader)->check_data_crc().ok();
+    EXPECT_TRUE(is_noticed) << "byte " << at << " of " << file_.size();
+  }
+}
+
 TEST_F(mcap_damage, flipped_bit_in_the_summary_falls_back_to_the_data) {
   const std::size_t summary = end_of(7) + 13;
   for (std::size_t at = summary; at < file_.size(); at += 13) {

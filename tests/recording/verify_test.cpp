@@ -302,6 +302,20 @@ TEST_F(Verify, ADamagedChunkIsNamed) {
   EXPECT_EQ(exit_code(path), 6);
 }
 
+TEST_F(Verify, DamageInWhatTheTicksDoNotNeedIsNamed) {
+  auto journal = journal::SessionJournal::open(sound());
+  ASSERT_TRUE(journal.ok());
+  const auto& chunk = (*journal)->container().chunks().front();
+  ASSERT_GE(chunk.message_index_length, 16u);
+  auto bytes = load_file(sound());
+  bytes[chunk.chunk_offset + chunk.chunk_length + chunk.message_index_length - 4] ^= 0x5a;
+  const auto path = save("damaged_index.mcap", bytes);
+  const auto report = verify(path);
+  expect_reason(report, "the CRC of all data does not match");
+  EXPECT_EQ(report.damaged_chunks, 0u);
+  EXPECT_EQ(exit_code(path), 6);
+}
+
 TEST_F(Verify, AGapIsNamed) {
   const auto path = at("gapped.mcap");
   record_simulation(path, 1216);

@@ -113,6 +113,8 @@ Result<VerifyReport> verify_journal(const std::string& path,
   if (whole.damaged_chunks > 0)
     report.reasons.push_back(fmt::format("{} damaged chunks, the first: {}", whole.damaged_chunks,
                                          whole.first_damage.message));
+  else if (Status data = (*journal)->container().check_data_crc(); !data.ok())
+    report.reasons.push_back(data.error().message);
   if (!info.is_finished) report.reasons.push_back("it has no end: " + report.container);
 
   std::optional<dynamics::StrainScheme> scheme;
