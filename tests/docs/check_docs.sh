@@ -9,15 +9,14 @@
 #            an option that no program or script has
 #   keys     docs/scripts-and-scenarios.md has exactly the keys that the sources read
 #
-# Each fault is one line on stdout; the exit code is 1 if there is any. What --help says is asked once, and kept
-# in the folder $HELP_TEXTS if several checks follow each other.
+# Each fault is one line on stdout; the exit code is 1 if there is any. What --help says is asked once.
 set -uo pipefail
 export LC_ALL=C.UTF-8
 
 check=${1:?check} root=$(cd "${2:?root of the repository}" && pwd) bin=${3:+$(cd "$3" && pwd)}
 cd "$root" || exit 2
 work=$(mktemp -d)
-faults=$work/faults texts=${HELP_TEXTS:-$work}
+faults=$work/faults
 : >"$faults"
 trap 'rm -rf "$work"' EXIT
 fault() { printf '%s\n' "$*" >>"$faults"; }
@@ -96,7 +95,7 @@ check_style() {
 }
 
 help_of() { # PROGRAM [COMMAND]
-  local text=$texts/${1##*/}${2:+-$2}.help
+  local text=$work/${1##*/}${2:+-$2}.help
   [ -e "$text" ] || "$@" --help >"$text" 2>/dev/null || { rm -f "$text"; return 1; }
   cat "$text"
 }

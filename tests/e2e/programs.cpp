@@ -49,11 +49,16 @@ double json_number(const std::string& json, const std::string& key) {
 }
 
 bool wait_until(const std::function<bool()>& condition, double seconds) {
-  for (int i = 0; i < static_cast<int>(seconds * 50); ++i) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::duration<double>(seconds);
+  while (Clock::now() < end) {
+    const auto before = Clock::now();
     if (condition()) return true;
-    std::this_thread::sleep_for(milliseconds(20));
+    // To read a long recording costs the session's own processor time: four fifths of it are left.
+    std::this_thread::sleep_for(
+        std::max<Clock::duration>(milliseconds(20), 4 * (Clock::now() - before)));
   }
-  return false;
+  return condition();
 }
 
 bool wait_for_file(const fs::path& file, double seconds) {
