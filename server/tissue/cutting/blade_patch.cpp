@@ -8,6 +8,9 @@ namespace {
 
 constexpr double kLeastSegment = 1e-6;  // m
 constexpr double kLeastSine = 1e-6;     // of the angle between the edges of a triangle
+// A blade that turns by more than 165 degrees goes back as it came.
+constexpr double kReturnCosine = -0.9659258262890683;
+constexpr double kSameDistance = 1 + 1e-9;
 
 Vec3d closest_on_segment(const Vec3d& a, const Vec3d& b, const Vec3d& p) {
   const Vec3d along = b - a;
@@ -23,14 +26,17 @@ void extend_ends(BladeEdge& edge, double extension) {
   last += out_of_last * extension;
 }
 
-void add_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, Vec3d& side,
+// Counter-clockwise seen from the left hand of the motion, with the edge pointing up.
+void add_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, double return_cosine, Side& side,
                   std::vector<PatchTriangle>& out) {
   auto triangle = make_triangle({a, b, c});
   if (!triangle) return;
-  if (dot(triangle->normal, side) < 0) triangle = make_triangle({a, c, b});
+  const Vec3d last = side.is_on_other_hand ? -side.normal : side.normal;
+  if (dot(triangle->normal, last) < return_cosine) side.is_on_other_hand = !side.is_on_other_hand;
+  if (side.is_on_other_hand) triangle = make_triangle({a, c, b});
   if (!triangle) return;
   out.push_back(*triangle);
-  side = triangle->normal;
+  side.normal = triangle->normal;
 }
 
 }  // namespace
@@ -98,12 +104,13 @@ double distance_squared(const PatchTriangle& triangle, const Vec3d& p) {
   return least;
 }
 
-void make_patch(const Strip& strip, double extension, SideNormals& sides,
+void make_patch(const Strip& strip, double extension, double least_turn, Sides& sides,
                 std::vector<PatchTriangle>& out) {
   out.clear();
   BladeEdge from = strip.from, to = strip.to;
   const double longest = longest_motion(from, to);
   if (!(longest > 0)) return;
+  const double return_cosine = longest < least_turn ? 0 : kReturnCosine;
   for (std::uint32_t i = 0; i < to.count; ++i) {
     const Vec3d ahead = (strip.to.points[i] - strip.from.points[i]) * (extension / longest);
     to.points[i] += ahead;
@@ -112,9 +119,31 @@ void make_patch(const Strip& strip, double extension, SideNormals& sides,
   extend_ends(from, extension);
   extend_ends(to, extension);
   for (std::uint32_t i = 0; i + 1 < to.count; ++i) {
-    add_triangle(from.points[i], from.points[i + 1], to.points[i + 1], sides[i], out);
-    add_triangle(from.points[i], to.points[i + 1], to.points[i], sides[i], out);
+    add_triangle(from.points[i], from.points[i + 1], to.points[i + 1], return_cosine, sides[i],
+                 out);
+    add_triangle(from.points[i], to.points[i + 1], to.points[i], return_cosine, sides[i], out);
   }
+}
+
+std::optional<NearestPart> nearest_part(const Strip& strip,
+                                        std::span<const PatchTriangle> triangles,
+                                        const Sides& before, const Sides& after, const Vec3d& p) {
+  std::optional<NearestPart> nearest;
+  for (const auto& triangle : triangles) {
+    const double d = distance_squared(triangle, p);
+    if (!nearest || d < nearest->distance_squared)
+      nearest = {d, signed_distance(triangle, p), false};
+  }
+  if (!nearest || strip.is_first) return nearest;
+  const auto& from = strip.from;
+  for (std::uint32_t i = 0; i + 1 < from.count; ++i) {
+    const Vec3d away = p - closest_on_segment(from.points[i], from.points[i + 1], p);
+    const double d = length_squared(away);
+    if (d > nearest->distance_squared * kSameDistance) continue;
+    nearest->is_joint = true;
+    nearest->height = dot(before[i].normal + after[i].normal, away) / 2;
+  }
+  return nearest;
 }
 
 }  // namespace trocar::cutting

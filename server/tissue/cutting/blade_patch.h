@@ -50,11 +50,33 @@ struct Strip {
   bool is_first = false;
 };
 
-// Each segment of an edge has a normal to its positive side; it goes on from strip to strip.
-using SideNormals = std::array<Vec3d, kMaxEdgePoints - 1>;
+// The positive side of a segment's strip. It stays on the same hand of the blade's motion, however
+// sharp the blade turns; but one that goes back as it came stays in its own cut, and there the side
+// is on the other hand.
+struct Side {
+  Vec3d normal;  // unit, to that side; zero: there was no strip yet
+  bool is_on_other_hand = false;
+};
+using Sides = std::array<Side, kMaxEdgePoints - 1>;  // of the last strip, by segment
 
-// extension: m. Triangles without area are left out.
-void make_patch(const Strip& strip, double extension, SideNormals& sides,
+// extension: m. Triangles without area are left out. Their normals are to the positive side, and
+// `sides` becomes that of this strip. least_turn: m; where a shorter motion leads is chance, and
+// its side is that nearest to the last one.
+void make_patch(const Strip& strip, double extension, double least_turn, Sides& sides,
                 std::vector<PatchTriangle>& out);
+
+// What a strip is near a place.
+struct NearestPart {
+  double distance_squared = 0;  // m^2
+  double height = 0;            // m, to the positive side
+  bool is_joint = false;        // it is where this strip goes on from the last one
+};
+// The part of a strip, without any extension, that is nearest to p. `before` and `after`: the sides
+// of the last strip and of this one; at the joint of two that make a corner, the positive side is
+// that of the mean of their normals (Baerentzen and Aanaes 2005, pseudonormals of an edge).
+// `triangles`: the strip by make_patch() without extension. Nothing if there are none.
+std::optional<NearestPart> nearest_part(const Strip& strip,
+                                        std::span<const PatchTriangle> triangles,
+                                        const Sides& before, const Sides& after, const Vec3d& p);
 
 }  // namespace trocar::cutting

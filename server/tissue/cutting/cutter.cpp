@@ -208,12 +208,16 @@ EdgeResistance Cutter::resistance_of(std::span<const Vec3f> displacements, doubl
 bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
   while (stroke.motion.has_strip()) {
     if (budget == 0) return false;
-    auto sides = stroke.side_normals;
-    make_patch(stroke.motion.strip(), mesh_.settings().extension_h * stroke.h, sides, stroke.patch);
+    for (const bool is_extended : {false, true}) {
+      stroke.sides = stroke.sides_before;
+      make_patch(stroke.motion.strip(), is_extended ? mesh_.settings().extension_h * stroke.h : 0,
+                 mesh_.settings().least_turn_h * stroke.h, stroke.sides,
+                 is_extended ? stroke.patch : stroke.path);
+    }
     const bool is_finished = splitter_->run(mesh_, stroke, stroke.patch, budget);
     opening_.run(mesh_, stroke);
     if (!is_finished) return false;
-    stroke.side_normals = sides;
+    stroke.sides_before = stroke.sides;
     stroke.way += longest_motion(stroke.motion.strip().from, stroke.motion.strip().to);
     stroke.motion.pop();
     if (stroke.way > mesh_.settings().repair_h * stroke.h) {
@@ -227,6 +231,7 @@ bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
 
 // Returns whether the stroke is over.
 bool Cutter::end(Stroke& stroke) {
+  if (stroke.repairs == 0 && side_cut_.run(mesh_, stroke, opening_)) opening_.run(mesh_, stroke);
   if (!repair_.finish(mesh_, stroke, opening_)) return false;
   mesh_.out().waiting_area_m2 += opening_.waiting_area(mesh_, stroke);
   stroke.clear();

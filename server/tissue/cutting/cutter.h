@@ -25,6 +25,7 @@
 #include "server/tissue/cutting/edge_resistance.h"
 #include "server/tissue/cutting/opening.h"
 #include "server/tissue/cutting/repair.h"
+#include "server/tissue/cutting/side_cut.h"
 #include "server/tissue/cutting/splitter.h"
 
 namespace trocar::cutting {
@@ -96,6 +97,7 @@ class Cutter {
   std::unique_ptr<PatchSplitter> splitter_;
   Opening opening_;
   Repair repair_;
+  SideCut side_cut_;
   EdgeMeter meter_;
   CutOutput unchanged_;                              // of calls that cut nothing
   std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone

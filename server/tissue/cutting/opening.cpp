@@ -57,6 +57,11 @@ double height_above(const Stroke& stroke, const Vec3d& p) {
   return height;
 }
 
+double height_of(const CutMesh& mesh, const Stroke& stroke, NodeIndex node) {
+  const auto height = stroke.height(node);
+  return height.nearest_squared >= 0 ? height.height : height_above(stroke, mesh.position(node));
+}
+
 }  // namespace
 
 int Opening::side(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
@@ -66,8 +71,7 @@ int Opening::side(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
   for (const auto node : mesh.topology().tet(t)) {
     if (stroke.is_labelled(node)) continue;
     is_flat = false;
-    const auto height = stroke.height(node);
-    sum += height.nearest_squared >= 0 ? height.height : height_above(stroke, mesh.position(node));
+    sum += height_of(mesh, stroke, node);
   }
   if (is_flat) return side_of_flat(mesh, stroke, t);
   return sum < 0 ? -1 : 1;

@@ -21,7 +21,8 @@ struct Settings {
   // Motion is collected until it is so long, or so many ticks old.
   double collect_h = 0.1;
   std::uint32_t collect_ticks = 8;
-  double piece_h = 0.5;  // longer motion is cut piece by piece
+  double least_turn_h = 0.05;  // a shorter motion is no turn of the blade
+  double piece_h = 0.5;        // longer motion is cut piece by piece
   // A blade that has gone farther at once, or since it was so many pieces ahead of the cutting, has
   // not moved but appeared.
   std::uint32_t most_pieces_of_motion = 16;

@@ -10,6 +10,8 @@ namespace {
 // An edge may be stretched to this many times its length at rest.
 constexpr double kMostStretch = 1.5;
 constexpr double kSlack_h = 1e-6;
+// Tissue may have moved a little between two strips: of squares of distances.
+constexpr double kJointSlack = 1.1;
 // A patch costs something even where there is nothing to cut; in edits.
 constexpr std::uint32_t kPatchCost = 1, kNearPerEdit = 64;
 
@@ -51,18 +53,19 @@ void Splitter::find_near(CutMesh& mesh, std::span<const PatchTriangle> patch) {
   });
 }
 
-void Splitter::measure(Stroke& stroke, std::span<const PatchTriangle> patch) const {
+// Heights above what the blade has really swept: where it turns, the patch runs on past the corner.
+// What was nearest to the end of the last strip is now nearest to the joint.
+void Splitter::measure(Stroke& stroke) const {
   for (std::size_t i = 0; i < near_.size(); ++i) {
     if (stroke.is_labelled(near_[i])) continue;
-    const auto& p = positions_[i];
-    auto best = stroke.height(near_[i]);
-    for (std::size_t k = 0; k < patch.size(); ++k) {
-      const double height = heights_[i * patch.size() + k];
-      if (best.nearest_squared >= 0 && best.nearest_squared <= height * height) continue;
-      const double nearest = distance_squared(patch[k], p);
-      if (best.nearest_squared < 0 || nearest < best.nearest_squared) best = {nearest, height};
-    }
-    stroke.measure(near_[i], best);
+    const auto known = stroke.height(near_[i]).nearest_squared;
+    const auto nearest = nearest_part(stroke.motion.strip(), stroke.path, stroke.sides_before,
+                                      stroke.sides, positions_[i]);
+    if (!nearest) return;
+    if (nearest->is_joint && known >= 0 && nearest->distance_squared <= kJointSlack * known)
+      stroke.measure_again(near_[i], {std::min(known, nearest->distance_squared), nearest->height});
+    else
+      stroke.measure(near_[i], {nearest->distance_squared, nearest->height});
   }
 }
 
@@ -183,7 +186,7 @@ bool Splitter::run(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle>
     stroke.h = 0;
     for (const auto node : near_) stroke.h += mesh.h(node) / static_cast<double>(near_.size());
   }
-  measure(stroke, patch);
+  measure(stroke);
   find_crossings(mesh, stroke, patch);
   for (const auto node : near_) rank_[node.value] = 0;
   leave_out_small_pieces(mesh);

@@ -34,7 +34,7 @@ class Splitter final : public PatchSplitter {
 
   Nearness look_at(std::span<const PatchTriangle> patch, const Vec3d& p, double reach);
   void find_near(CutMesh& mesh, std::span<const PatchTriangle> patch);
-  void measure(Stroke& stroke, std::span<const PatchTriangle> patch) const;
+  void measure(Stroke& stroke) const;
   void find_crossings(const CutMesh& mesh, const Stroke& stroke,
                       std::span<const PatchTriangle> patch);
   bool is_close(NodeIndex n) const;

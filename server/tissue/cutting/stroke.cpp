@@ -37,8 +37,8 @@ BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
   now_ = edge;
   ticks_ = std::min(ticks_ + 1, settings.collect_ticks);
   const double motion = longest_motion(anchor_, now_);
-  const bool is_due =
-      motion > settings.collect_h * h || (ticks_ == settings.collect_ticks && motion > kRest_h * h);
+  const bool is_due = motion > settings.collect_h * h ||
+                      (ticks_ == settings.collect_ticks && motion > settings.least_turn_h * h);
   // A blade too far ahead of the cutting goes on collecting.
   if (is_due && strips() < settings.most_pieces_of_motion) add_strips(h, settings);
   return Verdict::Accepted;
@@ -104,9 +104,13 @@ void Stroke::forget_height(NodeIndex node) {
 }
 
 bool Stroke::measure(NodeIndex node, const Height& height) {
+  const double known = this->height(node).nearest_squared;
+  return (known < 0 || known > height.nearest_squared) && measure_again(node, height);
+}
+
+bool Stroke::measure_again(NodeIndex node, const Height& height) {
   auto& own = at(heights_, node.value);
   const bool is_new = own.nearest_squared < 0;
-  if (!is_new && own.nearest_squared <= height.nearest_squared) return false;
   if (is_new) measured_.push_back(node);
   const bool has_turned = is_new || (own.height < 0) != (height.height < 0);
   own = height;
@@ -142,7 +146,8 @@ void Stroke::clear() {
   fresh.clear();
   patch.clear();
   motion.clear();
-  side_normals = {};
+  sides_before = sides = {};
+  path.clear();
   repairs = 0;
   way = 0;
   is_active = has_ended = false;

@@ -49,6 +49,7 @@ class BladeMotion {
 class Stroke {
  public:
   bool is_labelled(NodeIndex n) const { return n.value < labels_.size() && labels_[n.value] != 0; }
+  std::span<const NodeIndex> labelled() const { return labelled_; }
   void label(NodeIndex node);
   void remove_label(NodeIndex node);  // as if it had never been labelled
   // A labelled node belongs to one side after all.
@@ -63,6 +64,7 @@ class Stroke {
   }
   // Returns whether the node changed sides.
   bool measure(NodeIndex node, const Height& height);
+  bool measure_again(NodeIndex node, const Height& height);  // whatever was known
 
   // -1, 1, or 0 if not decided.
   int side(TetIndex t) const { return t.value < sides_.size() ? sides_[t.value] : 0; }
@@ -95,10 +97,12 @@ class Stroke {
   std::uint32_t id = 0;
   bool is_active = false, has_ended = false;
   BladeMotion motion;
-  std::uint32_t repairs = 0;  // rounds done since the end
-  double way = 0;             // m, of the blade since the last repair behind it
-  SideNormals side_normals{};
+  std::uint32_t repairs = 0;         // rounds done since the end
+  double way = 0;                    // m, of the blade since the last repair behind it
+  Sides sides_before{};              // of the strip before the one that is being cut
   std::vector<PatchTriangle> patch;  // the last one
+  Sides sides{};                     // its own; with a strip alone
+  std::vector<PatchTriangle> path;   // it without extension; with a strip alone
   double h = 0;                      // m, mean of the mesh where the blade cut last
   std::vector<TetIndex> waiting;     // tets with faces that could not be opened yet, ascending
   std::vector<NodeIndex> fresh;      // labelled or changed sides since the last opening

@@ -156,8 +156,9 @@ void Stroke::visit_state(world::StateArchive& archive, const topology::Topology&
   }
   archive.value(repairs);
   for (std::uint32_t i = 0; i + 1 < motion.points(); ++i) {
-    archive.value(side_normals[i]);
-    if (archive.is_reading() && !is_place(side_normals[i])) archive.fail();
+    archive.value(sides_before[i].normal);
+    archive.flag(sides_before[i].is_on_other_hand);
+    if (archive.is_reading() && !is_place(sides_before[i].normal)) archive.fail();
   }
   visit_patch(archive);
   visit_nodes(archive, topology);
