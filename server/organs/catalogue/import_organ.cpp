@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "server/organs/formats/mesh_file.h"
+#include "server/organs/formats/text_reader.h"
 #include "server/organs/label_map/label_mesh.h"
 #include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/mesh/fill_field.h"
@@ -146,6 +147,7 @@ Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& op
                                 const std::string& name, std::vector<std::string>& notes) {
   const auto nodes = nodes_of(options);
   if (!nodes) return nodes.error();
+  auto left_out = std::move(raw.left_out);
   auto solid = surface::check_surface(std::move(raw), options.unit, name);
   if (!solid) return solid.error();
   const surface::SignedDistance distance(*solid);
@@ -154,7 +156,8 @@ Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& op
                        solid->volume_m3, solid->area_m2, *nodes);
   if (!filled) return Error{ErrorCode::BadFile, name + ": " + filled.error().message};
   mesh::ImportedMesh imported{
-      std::move(filled->mesh), solid->offset_m, std::move(solid->warnings), {}, {}};
+      std::move(filled->mesh), solid->offset_m, std::move(solid->warnings), {}, {},
+      std::move(left_out)};
   imported.offset_m += centre_on_origin(imported.mesh);
   const double volume = total_volume(imported.mesh);
   const auto angles = dihedral_range(imported.mesh);
@@ -240,7 +243,10 @@ Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& s
     result.organ.fixed_nodes = organ::nodes_held_by(options.fix, result.organ.mesh);
     return {};
   }
-  const auto set = std::ranges::find(sets, *options.fix_set, &mesh::NamedNodes::name);
+  auto set = std::ranges::find(sets, *options.fix_set, &mesh::NamedNodes::name);
+  if (set == sets.end())
+    set = std::ranges::find(sets, formats::lower(*options.fix_set),
+                            [](const auto& one) { return formats::lower(one.name); });
   if (set == sets.end())
     return Error{ErrorCode::Usage,
                  "--fix: the file has no set '" + plain(*options.fix_set) +
@@ -267,6 +273,7 @@ Result<ImportedOrgan> make_organ(mesh::ImportedMesh imported, const std::filesys
   make_distinct(imported.node_sets, "sets of nodes", result.warnings);
   if (auto s = add_regions(std::move(imported.regions), result); !s) return s.error();
   if (auto s = hold(options, imported.node_sets, result); !s) return s.error();
+  std::ranges::move(imported.left_out, std::back_inserter(result.warnings));
   organ.node_masses_kg = organ::lumped_masses(organ);
   if (auto status = validate(organ); !status)
     return Error{ErrorCode::BadFile, path.string() + ": " + status.error().message};

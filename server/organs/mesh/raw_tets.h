@@ -40,6 +40,28 @@ struct RawTets {
   std::vector<std::int64_t> tet_regions;
   std::map<std::int64_t, std::string> region_names;  // of some of them
   std::vector<NamedNodes> node_sets;                 // in any order and number
+  std::vector<std::string> left_out;                 // one line each: what of the file is not here
+};
+
+// Regions from sets of tets in the file's order, of which a tet may be in several: it belongs to
+// the last. A set of all tets is a name of the whole, and no region. What differs from the file is
+// left_out.
+class RegionSets {
+ public:
+  explicit RegionSets(std::size_t tets) : region_of_(tets, 0) {}
+
+  // tets: distinct.
+  void add(const std::string& name, const std::vector<std::size_t>& tets);
+  // Gives `raw` its regions; tets of no set are the region "rest".
+  void finish(RawTets& raw) &&;
+
+ private:
+  struct Set {
+    std::string name;
+    std::size_t tets, kept;
+  };
+  std::vector<std::int64_t> region_of_;  // 1 for the first set
+  std::vector<Set> sets_;
 };
 
 struct ImportedMesh {
@@ -50,7 +72,11 @@ struct ImportedMesh {
   // an interface belong to both.
   std::vector<NamedNodes> regions;
   std::vector<NamedNodes> node_sets;  // that have nodes left
+  std::vector<std::string> left_out;  // one line each: what of the file is not here
 };
+
+// The names in quotation marks with commas between them; from some 200 bytes on dots follow.
+std::string list_of(const std::vector<std::string>& names);
 
 // `name` starts each error, usually the file's path.
 Result<ImportedMesh> make_mesh(RawTets raw, Unit unit, const std::string& name);
