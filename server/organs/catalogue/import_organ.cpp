@@ -225,15 +225,19 @@ void make_distinct(std::vector<mesh::NamedNodes>& sets, const char* what,
   if (!text.empty()) warnings.push_back(fmt::format("{} share a name, so {}", what, text));
 }
 
-// Regions of the organ's own material, for others to be given; an element belongs to the last
-// region that holds all of its nodes.
-Status add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
-  if (regions.empty()) return {};
+// Regions of the organ's own material, for others to be given. They say their tets only where
+// others than those would be in them by their nodes.
+void add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
+  if (regions.empty()) return;
   result.notes.push_back("regions: " + plain(names_of(regions)));
-  for (auto& region : regions)
-    result.organ.regions.push_back(
-        {plain(region.name), result.organ.material, std::move(region.nodes)});
-  return {};
+  organ::Organ& organ = result.organ;
+  for (const auto& region : regions)
+    organ.regions.push_back({plain(region.name), organ.material, region.nodes, {}});
+  const auto by_nodes = organ::material_map(organ).tets;
+  for (std::size_t r = 0; r < regions.size(); ++r)
+    organ.regions[r].tets = std::move(regions[r].tets);
+  if (organ::material_map(organ).tets == by_nodes)
+    for (auto& region : organ.regions) region.tets.clear();
 }
 
 Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& sets,
@@ -271,7 +275,7 @@ Result<ImportedOrgan> make_organ(mesh::ImportedMesh imported, const std::filesys
   organ.source_offset_m = imported.offset_m;
   make_distinct(imported.regions, "regions", result.warnings);
   make_distinct(imported.node_sets, "sets of nodes", result.warnings);
-  if (auto s = add_regions(std::move(imported.regions), result); !s) return s.error();
+  add_regions(std::move(imported.regions), result);
   if (auto s = hold(options, imported.node_sets, result); !s) return s.error();
   std::ranges::move(imported.left_out, std::back_inserter(result.warnings));
   organ.node_masses_kg = organ::lumped_masses(organ);

@@ -248,8 +248,9 @@ class Builder {
     };
     std::map<std::int64_t, NamedNodes> regions;
     for (std::size_t t = 0; t < raw_.tet_regions.size(); ++t) {
-      auto& nodes = regions[raw_.tet_regions[t]].nodes;
-      nodes.insert(nodes.end(), raw_.tets[t].begin(), raw_.tets[t].end());
+      auto& region = regions[raw_.tet_regions[t]];
+      region.nodes.insert(region.nodes.end(), raw_.tets[t].begin(), raw_.tets[t].end());
+      region.tets.emplace_back(t);
     }
     if (regions.size() > 1)
       for (auto& [number, region] : regions) {

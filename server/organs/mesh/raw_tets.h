@@ -29,6 +29,7 @@ double metres_of(Unit unit);
 struct NamedNodes {
   std::string name;
   std::vector<NodeIndex> nodes;  // ascending, distinct
+  std::vector<TetIndex> tets;    // likewise, of a region
 };
 
 struct RawTets {
@@ -68,8 +69,8 @@ struct ImportedMesh {
   TetMesh mesh;    // adjacency built, valid, rest bounding box centred on the origin
   Vec3d offset_m;  // add to a rest position to get the file's place
   std::vector<std::string> warnings;  // one line each: what was repaired, and how often
-  // Each region by name with the nodes of its tets, if the file has two regions or more; those at
-  // an interface belong to both.
+  // Each region by name with its tets and their nodes, if the file has two regions or more; those
+  // at an interface belong to both.
   std::vector<NamedNodes> regions;
   std::vector<NamedNodes> node_sets;  // that have nodes left
   std::vector<std::string> left_out;  // one line each: what of the file is not here
