@@ -19,6 +19,10 @@ Status inflate_into(std::string_view packed, Packing packing, std::size_t most_b
     stream.avail_out = sizeof chunk;
     result = inflate(&stream, Z_NO_FLUSH);
     out.append(chunk, sizeof chunk - stream.avail_out);
+    // A gzip file may have several members, and zeros behind them.
+    const bool has_more = result == Z_STREAM_END && packing == Packing::Gzip &&
+                          stream.avail_in > 0 && *stream.next_in != 0;
+    if (has_more) result = inflateReset(&stream);
   }
   inflateEnd(&stream);
   if (out.size() > most_bytes) return Error{ErrorCode::BadFile, "unpacks to too many bytes"};

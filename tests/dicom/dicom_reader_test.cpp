@@ -120,6 +120,80 @@ TEST_F(DicomReader, AFractionalSegmentIsInFromHalfItsGreatestValueOn) {
   EXPECT_EQ(map->labels[5], 1);
 }
 
+TEST_F(DicomReader, AllFramesMayShareTheirSegment) {
+  const auto path = segmentation([](DcmItem& data) {
+    for (int f = 0; f < 6; ++f)
+      delete add(data, DCM_PerFrameFunctionalGroupsSequence, f)
+          ->remove(DCM_SegmentIdentificationSequence);
+    put(*add(*add(data, DCM_SharedFunctionalGroupsSequence, 0), DCM_SegmentIdentificationSequence,
+             0),
+        DCM_ReferencedSegmentNumber, 2);
+  });
+  const auto map = read_dicom(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(std::ranges::count(map->labels, 1), 0);
+  EXPECT_GT(std::ranges::count(map->labels, 2), 0);
+}
+
+TEST_F(DicomReader, FramesOfOtherDirectionsAreRefused) {
+  EXPECT_EQ(error_of(segmentation([](DcmItem& data) {
+              put(*add(*add(data, DCM_PerFrameFunctionalGroupsSequence, 3),
+                       DCM_PlaneOrientationSequence, 0),
+                  DCM_ImageOrientationPatient, "0\\1\\0\\1\\0\\0");
+            })),
+            "frame 4: has other directions or distances than the first one");
+}
+
+TEST_F(DicomReader, PixelsOfALabelMapSegmentationAreTheNumbersOfSegments) {
+  const auto label_map = [&](int label) {
+    return segmentation([&](DcmItem& data) {
+      put(data, DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.66.7");
+      put(data, DCM_SegmentationType, "LABELMAP");
+      for (const auto& key : {DCM_BitsAllocated, DCM_BitsStored}) put(data, key, 8);
+      put(data, DCM_HighBit, 7);
+      put(data, DCM_PixelRepresentation, 0);
+      for (int f = 5; f >= 3; --f) {
+        DcmSequenceOfItems* frames = nullptr;
+        ASSERT_TRUE(data.findAndGetSequence(DCM_PerFrameFunctionalGroupsSequence, frames).good());
+        delete frames->remove(static_cast<unsigned long>(f));
+      }
+      std::vector<Uint8> all(kColumns * kRows * 3, 0);
+      all[7] = static_cast<Uint8>(label);
+      ASSERT_TRUE(data.putAndInsertUint8Array(DCM_PixelData, all.data(), all.size()).good());
+    });
+  };
+  const auto map = read_dicom(label_map(2));
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->labels[7], 2);
+  EXPECT_EQ(std::ranges::count(map->labels, 0), kColumns * kRows * 3 - 1);
+  EXPECT_EQ(map->names.size(), 2u);
+  EXPECT_EQ(error_of(label_map(9)), "frame 1: there is no segment 9");
+}
+
+TEST_F(DicomReader, OnlyTheBitsThatAreStoredCount) {
+  const auto with = [&](Uint16 pixel, int stored, int high, int sign) {
+    empty();
+    series(-1, [&](DcmItem& data, int) {
+      put(data, DCM_BitsStored, stored);
+      put(data, DCM_HighBit, high);
+      put(data, DCM_PixelRepresentation, sign);
+      std::vector<Uint16> pixels(kColumns * kRows, 0);
+      pixels[4] = pixel;
+      ASSERT_TRUE(data.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+    });
+    const auto map = read_dicom(folder_);
+    return map.ok() ? std::to_string(map->labels[4]) : error_of(folder_);
+  };
+  EXPECT_EQ(with(0x1002, 12, 11, 0), "2");
+  EXPECT_EQ(with(0x0025, 12, 15, 0), "2");
+  EXPECT_EQ(with(0x0fff, 12, 11, 0), "4095");
+  EXPECT_EQ(with(2, 16, 15, 1), "2");
+  EXPECT_EQ(with(0x0fff, 12, 11, 1),
+            "pixel (4, 0) is -1, which is no label: labels are whole numbers from 0 to 65535");
+  EXPECT_EQ(with(2, 17, 16, 0), "BitsStored is 17, must be 1 to 16");
+  EXPECT_EQ(with(2, 12, 16, 0), "HighBit is 16, must be 11 to 15");
+}
+
 TEST_F(DicomReader, SaysWhatIsWrongWithASegmentation) {
   const auto error = [&](const std::function<void(DcmItem&)>& change) {
     return error_of(segmentation(change));
@@ -130,8 +204,8 @@ TEST_F(DicomReader, SaysWhatIsWrongWithASegmentation) {
   EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_Rows, 8); }),
             "PixelData has 48 bytes, 54 are needed: it is cut off");
   EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_Columns, 0); }), "Columns is 0, must be 1 to 65535");
-  EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_SegmentationType, "LABELMAP"); }),
-            "SegmentationType is neither BINARY nor FRACTIONAL");
+  EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_SegmentationType, "OTHER"); }),
+            "SegmentationType is none of BINARY, FRACTIONAL, LABELMAP");
   EXPECT_EQ(error([](DcmItem& d) {
               put(*add(*add(d, DCM_PerFrameFunctionalGroupsSequence, 2),
                        DCM_SegmentIdentificationSequence, 0),

@@ -234,6 +234,15 @@ TEST(GlbReader, WhatCannotBeReadIsNamed) {
       {"refers to vertex 4, it has 4",
        [](Glb& g) { g.body[g.json["bufferViews"][2]["byteOffset"].get<std::size_t>()] = 4; }},
       {"vertex 0 is not finite", [](Glb& g) { g.body[2] = '\x80', g.body[3] = '\x7f'; }},
+      {"nodes[0] has weights that change its shape",
+       [](Glb& g) {
+         g.json["meshes"][0]["weights"] = {0, 0.5};
+       }},
+      {"nodes[0] has weights that change its shape",
+       [](Glb& g) {
+         g.json["meshes"][0]["weights"] = {0};
+         g.json["nodes"][0]["weights"] = {1};
+       }},
       {"is a strip or fan", [](Glb& g) { g.json["meshes"][0]["primitives"][0]["mode"] = 5; }},
       {"has no triangles",
        [](Glb& g) {
@@ -267,6 +276,20 @@ TEST(GlbReader, WhatCannotBeReadIsNamed) {
     EXPECT_TRUE(error.starts_with("a.glb: ")) << error;
     EXPECT_NE(error.find(words), std::string::npos) << error << "\n  instead of " << words;
   }
+}
+
+TEST(GlbReader, WhatIsNoTriangleInRestIsLeftOutAndSaid) {
+  Glb glb;
+  glb.json["meshes"][0]["weights"] = {0, 0.0};
+  glb.json["meshes"][0]["primitives"][1]["mode"] = 1;
+  glb.json["animations"] = {Json::object()};
+  glb.json["scenes"].push_back(Json::object());
+  const auto surface = parse_glb(glb.file(), "a.glb");
+  ASSERT_TRUE(surface.ok()) << surface.error().message;
+  EXPECT_EQ(surface->left_out,
+            (std::vector<std::string>{"left out 1 lists of points or lines",
+                                      "left out its animations: taken in its pose at rest",
+                                      "left out the other 1 scenes"}));
 }
 
 TEST(GlbReader, AFileThatIsNoneIsRefusedAtEachLength) {

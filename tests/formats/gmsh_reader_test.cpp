@@ -116,7 +116,10 @@ TEST(GmshReader, ReadsVersions1And4) {
     ASSERT_TRUE(raw.ok()) << raw.error().message;
     EXPECT_EQ(raw->positions.size(), 4u);
     ASSERT_EQ(raw->tets.size(), 1u);
-    EXPECT_EQ(raw->tet_regions, std::vector<std::int64_t>{7});
+    EXPECT_TRUE(raw->tet_regions.empty());
+    EXPECT_EQ(raw->left_out,
+              std::vector<std::string>{"no region, as it holds all elements: '" +
+                                       std::string(text == kVersion1 ? "region 7'" : "inside'")});
     ASSERT_EQ(raw->node_sets.size(), 1u);
     EXPECT_EQ(raw->node_sets[0].name, text == kVersion1 ? "5" : "capsule");
     EXPECT_EQ(raw->node_sets[0].nodes.size(), 3u);

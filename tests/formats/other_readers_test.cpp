@@ -51,8 +51,8 @@ TEST(AbaqusReader, ReadsTetsRegionsAndSets) {
   ASSERT_TRUE(raw.ok()) << raw.error().message;
   ASSERT_EQ(raw->tets.size(), 2u);
   // The set of all elements is no region; what is in none is the rest.
-  EXPECT_EQ(raw->tet_regions, (std::vector<std::int64_t>{0, 1}));
-  EXPECT_EQ(raw->region_names.at(1), "TUMOUR");
+  EXPECT_EQ(raw->tet_regions, (std::vector<std::int64_t>{0, 2}));
+  EXPECT_EQ(raw->region_names.at(2), "TUMOUR");
   EXPECT_EQ(raw->region_names.at(0), "rest");
   ASSERT_EQ(raw->node_sets.size(), 2u);
   EXPECT_EQ(raw->node_sets[1].name, "BASE");

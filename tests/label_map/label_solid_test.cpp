@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <random>
 
@@ -70,6 +71,23 @@ TEST(LabelSolid, ChoosesLabelsAndOneBody) {
   auto nothing = ball_in_ball();
   std::fill(nothing.labels.begin(), nothing.labels.end(), std::uint16_t{0});
   EXPECT_FALSE(LabelSolid::make(nothing, {}, "a.nii").ok());
+}
+
+TEST(LabelSolid, OneVoxelThickIsRefusedAtOnce) {
+  const auto error_of = [](const std::function<bool(int, int, int)>& is_in) {
+    const auto map = parse_nifti(
+        nifti({20, 20, 20}, 3, [&](int i, int j, int k) { return is_in(i, j, k) ? 1 : 0; }),
+        std::nullopt, "a.nii");
+    TROCAR_ASSERT(map.ok());
+    const auto solid = LabelSolid::make(*map, {}, "a.nii");
+    return solid.ok() ? "accepted" : solid.error().message;
+  };
+  const std::string rest =
+      " 3 mm thick: it has no inside, whatever the number of nodes; take a map of thinner voxels";
+  EXPECT_EQ(error_of([](int, int j, int) { return j == 4; }), "a.nii: is one slice," + rest);
+  EXPECT_EQ(error_of([](int i, int j, int k) { return (i == 4) + (j == 4) + (k == 4) > 1; }),
+            "a.nii: is hardly anywhere thicker than a voxel, at most" + rest);
+  EXPECT_EQ(error_of([](int, int j, int) { return j == 4 || j == 5; }), "accepted");
 }
 
 // The request is a volume within 1 % of the map's, and regions by label.

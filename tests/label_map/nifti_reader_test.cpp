@@ -66,18 +66,61 @@ TEST(NiftiReader, SaysWhatTheFileLeavesOpen) {
   EXPECT_EQ(parse(file, mesh::Unit::Centimetre)->warnings.size(), 1u);
 }
 
-TEST(NiftiReader, ReadsGzipAndOtherTypes) {
-  const auto file = small();
-  std::string packed(compressBound(file.size()) + 64, '\0');
+TEST(NiftiReader, SaysWhereSformAndQformDisagree) {
+  const auto warnings_of = [](const std::string& file) {
+    const auto map = parse(file);
+    return map.ok() && map->warnings.size() == 1 ? map->warnings[0] : "another number of warnings";
+  };
+  // The sform of the sample without a turn, which a qform says likewise.
+  auto file = small();
+  put(file, 252, std::int16_t{1});
+  for (const int d : {1, 2, 3}) put(file, static_cast<std::size_t>(76 + 4 * d), 2.0f);
+  put(file, 268, 10.0f);
+  EXPECT_TRUE(parse(file)->warnings.empty());
+  put(file, 268, 15.0f);
+  EXPECT_EQ(warnings_of(file), "sform and qform disagree by up to 5 mm: sform was taken");
+  put(file, 264, 1.0f);
+  EXPECT_EQ(warnings_of(file),
+            "sform and qform disagree about the sides: sform says RAS, qform LPS; sform was taken");
+  put(file, 264, 2.0f);
+  EXPECT_EQ(warnings_of(file), "sform and qform disagree: qform gives no place, sform was taken");
+}
+
+TEST(NiftiReader, ASlopeOfZeroScalesNothing) {
+  auto file = small();
+  put(file, 112, 0.0f);
+  put(file, 116, 7.0f);
+  ASSERT_TRUE(parse(file).ok()) << error_of(file);
+  EXPECT_EQ(parse(file)->labels, parse(small())->labels);
+}
+
+std::string gzip(const std::string& text) {
+  std::string packed(compressBound(text.size()) + 64, '\0');
   z_stream stream{};
-  ASSERT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(file.data()));
-  stream.avail_in = static_cast<uInt>(file.size());
+  EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
   stream.next_out = reinterpret_cast<Bytef*>(packed.data());
   stream.avail_out = static_cast<uInt>(packed.size());
-  ASSERT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
   packed.resize(stream.total_out);
   deflateEnd(&stream);
+  return packed;
+}
+
+TEST(NiftiReader, ReadsAllMembersOfAGzipFile) {
+  const auto file = small();
+  const auto packed = gzip(file.substr(0, 360)) + gzip("") + gzip(file.substr(360));
+  for (const auto& text : {packed, packed + std::string(512, '\0')}) {
+    ASSERT_TRUE(parse(text).ok()) << error_of(text);
+    EXPECT_EQ(parse(text)->labels, parse(file)->labels);
+  }
+  EXPECT_NE(error_of(packed + "rest").find("damaged or cut off"), std::string::npos);
+}
+
+TEST(NiftiReader, ReadsGzipAndOtherTypes) {
+  const auto file = small();
+  const auto packed = gzip(file);
   const auto map = parse(packed);
   ASSERT_TRUE(map.ok()) << map.error().message;
   EXPECT_EQ(map->labels, parse(file)->labels);

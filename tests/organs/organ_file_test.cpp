@@ -265,7 +265,7 @@ TEST(OrganFile, AnnouncedLengthsTakeNoMemory) {
 
 // Few bytes that stand for much: packed lists of zeros, empty messages, fields of no meaning.
 TEST(OrganFile, SmallFilesBuildLittle) {
-  constexpr PackedKind kKind{"TROCARO1", "an .organ file", "", "", 2, 3};
+  constexpr PackedKind kKind{"TROCARO1", "an .organ file", "", "", 2, 4};
   // Numbers of fields, as bytes before a length: 4 is the tets, 11 a region, 14 and 4 a row, 100 is
   // none.
   const auto repeated = [](std::string_view one, std::size_t count) {
@@ -363,6 +363,31 @@ TEST(LoadOrgan, ImportsAMesh) {
   ASSERT_TRUE(imported.ok());
   EXPECT_EQ(imported->organ.name, "other_");
   EXPECT_TRUE(imported->organ.fixed_nodes.empty());
+}
+
+// All nodes of the middle tet are in the region behind it: by its nodes it would be lost.
+TEST(LoadOrgan, ARegionOfElementsKeepsThoseWhoseNodesAreAllInAnother) {
+  const trocar::testing::TemporaryFolder folder;
+  const auto path = folder.file("thin.msh");
+  std::ofstream(path) << "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+                         "$PhysicalNames\n2\n3 1 \"lumen\"\n3 2 \"wall\"\n$EndPhysicalNames\n"
+                         "$Nodes\n6\n1 0 0 0\n2 0.1 0 0\n3 0 0.1 0\n4 0 0 0.1\n5 0 0 -0.1\n"
+                         "6 0.1 0.1 0.1\n$EndNodes\n$Elements\n3\n1 4 2 1 1 1 2 3 4\n"
+                         "2 4 2 2 1 1 3 2 5\n3 4 2 2 1 2 3 4 6\n$EndElements\n";
+  auto organ = catalogue::import_organ(path, {})->organ;
+  ASSERT_EQ(organ.regions.size(), 2u);
+  EXPECT_EQ(organ.regions[0].tets, std::vector{TetIndex(0)});
+  EXPECT_EQ(material_map(organ).tets, (std::vector<std::uint16_t>{1, 2, 2}));
+
+  const auto again = unpack_organ(pack_organ(organ));
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(*again, organ);
+  const auto hash = organ_hash(organ);
+  organ.regions[0].tets = organ.regions[1].tets = {};
+  EXPECT_EQ(material_map(organ).tets, (std::vector<std::uint16_t>{2, 2, 2}));
+  EXPECT_NE(organ_hash(organ), hash);
+  organ.regions[0].tets = {TetIndex(1)};
+  EXPECT_NE(validate(organ).error().message.find("tets of region 'lumen'"), std::string::npos);
 }
 
 // Without names, groups of lines and of triangles have the same numbers.

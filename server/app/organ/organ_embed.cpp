@@ -125,6 +125,7 @@ Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ
   }
   auto fine = embed::embed(*raw, organ.mesh, options);
   if (!fine) return fine.error();
+  fine->warnings.insert(fine->warnings.begin(), raw->left_out.begin(), raw->left_out.end());
   for (const std::string& warning : fine->warnings)
     std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, command.file.c_str(), warning.c_str());
   std::fprintf(stderr,

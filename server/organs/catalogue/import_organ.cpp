@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "server/organs/formats/mesh_file.h"
+#include "server/organs/formats/text_reader.h"
 #include "server/organs/label_map/label_mesh.h"
 #include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/mesh/fill_field.h"
@@ -146,6 +147,7 @@ Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& op
                                 const std::string& name, std::vector<std::string>& notes) {
   const auto nodes = nodes_of(options);
   if (!nodes) return nodes.error();
+  auto left_out = std::move(raw.left_out);
   auto solid = surface::check_surface(std::move(raw), options.unit, name);
   if (!solid) return solid.error();
   const surface::SignedDistance distance(*solid);
@@ -154,7 +156,8 @@ Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& op
                        solid->volume_m3, solid->area_m2, *nodes);
   if (!filled) return Error{ErrorCode::BadFile, name + ": " + filled.error().message};
   mesh::ImportedMesh imported{
-      std::move(filled->mesh), solid->offset_m, std::move(solid->warnings), {}, {}};
+      std::move(filled->mesh), solid->offset_m, std::move(solid->warnings), {}, {},
+      std::move(left_out)};
   imported.offset_m += centre_on_origin(imported.mesh);
   const double volume = total_volume(imported.mesh);
   const auto angles = dihedral_range(imported.mesh);
@@ -222,15 +225,19 @@ void make_distinct(std::vector<mesh::NamedNodes>& sets, const char* what,
   if (!text.empty()) warnings.push_back(fmt::format("{} share a name, so {}", what, text));
 }
 
-// Regions of the organ's own material, for others to be given; an element belongs to the last
-// region that holds all of its nodes.
-Status add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
-  if (regions.empty()) return {};
+// Regions of the organ's own material, for others to be given. They say their tets only where
+// others than those would be in them by their nodes.
+void add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
+  if (regions.empty()) return;
   result.notes.push_back("regions: " + plain(names_of(regions)));
-  for (auto& region : regions)
-    result.organ.regions.push_back(
-        {plain(region.name), result.organ.material, std::move(region.nodes)});
-  return {};
+  organ::Organ& organ = result.organ;
+  for (const auto& region : regions)
+    organ.regions.push_back({plain(region.name), organ.material, region.nodes, {}});
+  const auto by_nodes = organ::material_map(organ).tets;
+  for (std::size_t r = 0; r < regions.size(); ++r)
+    organ.regions[r].tets = std::move(regions[r].tets);
+  if (organ::material_map(organ).tets == by_nodes)
+    for (auto& region : organ.regions) region.tets.clear();
 }
 
 Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& sets,
@@ -240,7 +247,10 @@ Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& s
     result.organ.fixed_nodes = organ::nodes_held_by(options.fix, result.organ.mesh);
     return {};
   }
-  const auto set = std::ranges::find(sets, *options.fix_set, &mesh::NamedNodes::name);
+  auto set = std::ranges::find(sets, *options.fix_set, &mesh::NamedNodes::name);
+  if (set == sets.end())
+    set = std::ranges::find(sets, formats::lower(*options.fix_set),
+                            [](const auto& one) { return formats::lower(one.name); });
   if (set == sets.end())
     return Error{ErrorCode::Usage,
                  "--fix: the file has no set '" + plain(*options.fix_set) +
@@ -265,8 +275,9 @@ Result<ImportedOrgan> make_organ(mesh::ImportedMesh imported, const std::filesys
   organ.source_offset_m = imported.offset_m;
   make_distinct(imported.regions, "regions", result.warnings);
   make_distinct(imported.node_sets, "sets of nodes", result.warnings);
-  if (auto s = add_regions(std::move(imported.regions), result); !s) return s.error();
+  add_regions(std::move(imported.regions), result);
   if (auto s = hold(options, imported.node_sets, result); !s) return s.error();
+  std::ranges::move(imported.left_out, std::back_inserter(result.warnings));
   organ.node_masses_kg = organ::lumped_masses(organ);
   if (auto status = validate(organ); !status)
     return Error{ErrorCode::BadFile, path.string() + ": " + status.error().message};

@@ -40,7 +40,7 @@ struct ImportedOrgan {
   double unit_m = 1;  // of the file's numbers
   // Those of the organ: a label map is turned to left, head and front, a surface stays as it says.
   surface::Axes axes = surface::Axes::Unsaid;
-  std::vector<std::string> warnings;  // one line each: what was repaired
+  std::vector<std::string> warnings;  // one line each: what was repaired or left out
   std::vector<std::string> notes;     // one line each: how a surface was filled, regions, sets
 };
 

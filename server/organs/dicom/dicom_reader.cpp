@@ -23,6 +23,8 @@ constexpr std::size_t kMaxFiles = 4096;
 constexpr std::uint32_t kLazyBytes =
     4096;  // longer values stay in the file until they are asked for
 constexpr double kMax_mm = 1e6;
+// Label map segmentations (supplement 243), which older DCMTK does not name.
+constexpr const char* kLabelMapStorage = "1.2.840.10008.5.1.4.1.1.66.7";
 
 struct Plane {
   Vec3d right, down;  // steps between pixels, mm, to the patient's left, back, head
@@ -38,6 +40,26 @@ bool starts_as_dicom(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   char begin[132]{};
   return file.read(begin, sizeof begin) && std::string_view(begin + 128, 4) == "DICM";
+}
+
+// Which bits of a stored pixel are its value, and whether it can be below 0.
+struct PixelBits {
+  int allocated = 8, stored = 8, shift = 0;
+  bool is_signed = false;
+
+  int value(const std::uint8_t* bytes, std::size_t i) const {
+    const int raw = allocated == 8 ? bytes[i] : bytes[2 * i] | bytes[2 * i + 1] << 8;
+    const int value = raw >> shift & ((1 << stored) - 1);
+    return is_signed && (value >> (stored - 1) & 1) != 0 ? value - (1 << stored) : value;
+  }
+};
+
+bool is_close(const Vec3d& a, const Vec3d& b) {
+  return length(a - b) <= 1e-3 * length(b);
+}
+
+bool is_segmentation(const std::string& storage) {
+  return storage == UID_SegmentationStorage || storage == kLabelMapStorage;
 }
 
 std::string text_of(DcmItem& item, const DcmTagKey& key) {
@@ -61,6 +83,26 @@ class Reader {
     if (value < least || value > most)
       return error(fmt::format("{} is {}, must be {} to {}", attribute, value, least, most));
     return int{value};
+  }
+
+  // All bits where nothing is said of them.
+  Result<PixelBits> pixel_bits() {
+    const auto allocated = whole(DCM_BitsAllocated, "BitsAllocated", 8, 16);
+    if (!allocated) return allocated.error();
+    if (*allocated != 8 && *allocated != 16)
+      return error(fmt::format("BitsAllocated is {}, must be 8 or 16", *allocated));
+    const auto has = [&](const DcmTagKey& key) { return data_.tagExistsWithValue(key); };
+    const auto stored =
+        has(DCM_BitsStored) ? whole(DCM_BitsStored, "BitsStored", 1, *allocated) : allocated;
+    if (!stored) return stored.error();
+    const auto high = has(DCM_HighBit) ? whole(DCM_HighBit, "HighBit", *stored - 1, *allocated - 1)
+                                       : Result<int>(*stored - 1);
+    if (!high) return high.error();
+    const auto sign = has(DCM_PixelRepresentation)
+                          ? whole(DCM_PixelRepresentation, "PixelRepresentation", 0, 1)
+                          : Result<int>(0);
+    if (!sign) return sign.error();
+    return PixelBits{*allocated, *stored, *high + 1 - *stored, *sign == 1};
   }
 
   Result<std::vector<double>> numbers(DcmItem& item, const DcmTagKey& key, const char* attribute,
@@ -166,14 +208,14 @@ class SegmentationReader {
 
   Result<LabelMap> run() {
     for (auto step : {&SegmentationReader::read_kind, &SegmentationReader::read_segments,
-                      &SegmentationReader::read_plane, &SegmentationReader::read_frames})
+                      &SegmentationReader::read_frames})
       if (auto s = (this->*step)(); !s) return s.error();
     const auto grid = arrange_slices(places_, plane_.right, plane_.down, plane_.spacing_mm, true);
     if (!grid) return reader_.error(grid.error().message);
     auto map = make_map(plane_, *grid, reader_);
     if (!map) return map.error();
-    map->names = std::move(names_);
     if (auto s = fill(*grid, *map); !s) return s.error();
+    map->names = std::move(names_);
     return map;
   }
 
@@ -181,8 +223,15 @@ class SegmentationReader {
   Status read_kind() {
     const std::string kind = text_of(reader_.data(), DCM_SegmentationType);
     is_binary_ = kind == "BINARY";
-    if (!is_binary_ && kind != "FRACTIONAL")
-      return reader_.error("SegmentationType is neither BINARY nor FRACTIONAL");
+    is_label_map_ = kind == "LABELMAP";
+    if (!is_binary_ && !is_label_map_ && kind != "FRACTIONAL")
+      return reader_.error("SegmentationType is none of BINARY, FRACTIONAL, LABELMAP");
+    if (is_label_map_) {
+      const auto found = reader_.pixel_bits();
+      if (!found) return found.error();
+      bits_ = *found;
+      return {};
+    }
     const int bits = is_binary_ ? 1 : 8;
     if (auto b = reader_.whole(DCM_BitsAllocated, "BitsAllocated", bits, bits); !b)
       return b.error();
@@ -199,7 +248,9 @@ class SegmentationReader {
     for (long i = 0; reader_.data().findAndGetSequenceItem(DCM_SegmentSequence, segment, i).good();
          ++i) {
       Uint16 number = 0;
-      if (segment->findAndGetUint16(DCM_SegmentNumber, number).bad() || number == 0)
+      const bool has_number = segment->findAndGetUint16(DCM_SegmentNumber, number).good();
+      if (has_number && number == 0 && is_label_map_) continue;  // the background
+      if (!has_number || number == 0)
         return reader_.error(fmt::format("segment {} has no SegmentNumber from 1 to 65535", i + 1));
       names_.emplace_back(number, text_of(*segment, DCM_SegmentLabel));
     }
@@ -207,23 +258,25 @@ class SegmentationReader {
     return {};
   }
 
-  // An attribute stands in the shared groups, or in those of each frame: then the first counts.
-  DcmItem* group(const DcmTagKey& key) {
-    for (const auto& groups :
-         {DCM_SharedFunctionalGroupsSequence, DCM_PerFrameFunctionalGroupsSequence})
-      if (auto* shared = only_item(reader_.data(), groups))
-        if (auto* item = only_item(*shared, key)) return item;
-    return nullptr;
+  // What stands in the groups of a frame, or else in those that all frames share; null: in neither.
+  DcmItem* group(DcmItem& frame, const DcmTagKey& key) {
+    if (auto* own = only_item(frame, key)) return own;
+    auto* shared = only_item(reader_.data(), DCM_SharedFunctionalGroupsSequence);
+    return shared ? only_item(*shared, key) : nullptr;
   }
 
-  Status read_plane() {
-    auto* orientation = group(DCM_PlaneOrientationSequence);
+  // The same for all frames.
+  Status read_plane(DcmItem& frame, const std::string& begin) {
+    auto* orientation = group(frame, DCM_PlaneOrientationSequence);
     if (!orientation) return reader_.error("PlaneOrientationSequence is missing");
-    auto* measures = group(DCM_PixelMeasuresSequence);
+    auto* measures = group(frame, DCM_PixelMeasuresSequence);
     if (!measures) return reader_.error("PixelMeasuresSequence is missing");
     auto plane = reader_.plane(*orientation, *measures);
     if (!plane) return plane.error();
-    plane_ = *plane;
+    if (places_.empty())
+      plane_ = *plane;
+    else if (!is_close(plane->right, plane_.right) || !is_close(plane->down, plane_.down))
+      return reader_.error(begin + "has other directions or distances than the first one");
     return {};
   }
 
@@ -234,24 +287,31 @@ class SegmentationReader {
                          .good();
          ++i) {
       const std::string begin = fmt::format("frame {}: ", i + 1);
-      auto* position = only_item(*frame, DCM_PlanePositionSequence);
+      if (auto s = read_plane(*frame, begin); !s) return s;
+      auto* position = group(*frame, DCM_PlanePositionSequence);
       if (!position) return reader_.error(begin + "PlanePositionSequence is missing");
       const auto place = reader_.place(*position);
       if (!place) return place.error();
-      auto* identity = only_item(*frame, DCM_SegmentIdentificationSequence);
+      places_.push_back(*place);
+      if (is_label_map_) continue;
+      auto* identity = group(*frame, DCM_SegmentIdentificationSequence);
       Uint16 number = 0;
       if (!identity || identity->findAndGetUint16(DCM_ReferencedSegmentNumber, number).bad())
         return reader_.error(begin + "ReferencedSegmentNumber is missing");
-      if (std::ranges::find(names_, number, &std::pair<std::uint16_t, std::string>::first) ==
-          names_.end())
+      if (!has_segment(number))
         return reader_.error(fmt::format("{}there is no segment {}", begin, number));
-      places_.push_back(*place);
       segments_.push_back(number);
     }
-    return {};
+    return places_.empty() ? Status(reader_.error("has no frames")) : Status{};
+  }
+
+  bool has_segment(int number) const {
+    return std::ranges::find(names_, number, &std::pair<std::uint16_t, std::string>::first) !=
+           names_.end();
   }
 
   Status fill(const SliceGrid& grid, LabelMap& map) {
+    if (is_label_map_) return fill_labels(grid, map);
     const std::size_t size = plane_.pixels(), all = size * places_.size();
     const auto stored = reader_.pixels(is_binary_ ? (all + 7) / 8 : all);
     if (!stored) return stored.error();
@@ -272,10 +332,31 @@ class SegmentationReader {
     return {};
   }
 
+  // Each pixel is the number of its segment.
+  Status fill_labels(const SliceGrid& grid, LabelMap& map) {
+    const std::size_t size = plane_.pixels(), all = size * places_.size();
+    const auto stored = reader_.pixels(all * static_cast<std::size_t>(bits_.allocated) / 8);
+    if (!stored) return stored.error();
+    std::vector<std::uint8_t> is_filled(static_cast<std::size_t>(grid.count), 0);
+    for (std::size_t f = 0; f < places_.size(); ++f) {
+      const auto place = static_cast<std::size_t>(grid.slice_of_places[f]);
+      if (std::exchange(is_filled[place], std::uint8_t{1}))
+        return reader_.error(fmt::format("frame {}: another frame stands at its place", f + 1));
+      for (std::size_t i = 0; i < size; ++i) {
+        const int label = bits_.value(*stored, f * size + i);
+        if (label != 0 && !has_segment(label))
+          return reader_.error(fmt::format("frame {}: there is no segment {}", f + 1, label));
+        map.labels[size * place + i] = static_cast<std::uint16_t>(label);
+      }
+    }
+    return {};
+  }
+
   Reader& reader_;
   Plane plane_;
-  bool is_binary_ = true;
-  int half_ = 1;  // a fractional voxel belongs to its segment from this value on
+  bool is_binary_ = true, is_label_map_ = false;
+  PixelBits bits_;  // of a label map
+  int half_ = 1;    // a fractional voxel belongs to its segment from this value on
   std::vector<std::pair<std::uint16_t, std::string>> names_;
   std::vector<Vec3d> places_;            // by frame
   std::vector<std::uint16_t> segments_;  // by frame
@@ -325,7 +406,7 @@ class SeriesReader {
     const auto file = open(path);
     if (!file) return file.error();
     Reader reader(**file, path.string());
-    if (text_of(reader.data(), DCM_SOPClassUID) == UID_SegmentationStorage)
+    if (is_segmentation(text_of(reader.data(), DCM_SOPClassUID)))
       return reader.error("is a segmentation: import this file by itself");
     const std::string series = text_of(reader.data(), DCM_SeriesInstanceUID);
     auto plane = reader.plane(reader.data(), reader.data());
@@ -343,7 +424,6 @@ class SeriesReader {
     places_.push_back(*place);
     return {};
   }
-  static bool is_close(const Vec3d& a, const Vec3d& b) { return length(a - b) <= 1e-3 * length(b); }
 
   Status read_pixels(std::size_t i, const SliceGrid& grid, Result<LabelMap>& map) {
     const auto file = open(files_[i]);
@@ -356,12 +436,10 @@ class SeriesReader {
           reader.data().findAndGetFloat64(key, value).good() && value != plain)
         return reader.error(fmt::format("{} is {}: {}", attribute, value, label_map::kGreyValues));
     if (auto n = reader.whole(DCM_SamplesPerPixel, "SamplesPerPixel", 1, 1); !n) return n.error();
-    const auto bits = reader.whole(DCM_BitsAllocated, "BitsAllocated", 8, 16);
+    const auto bits = reader.pixel_bits();
     if (!bits) return bits.error();
-    if (*bits != 8 && *bits != 16)
-      return reader.error(fmt::format("BitsAllocated is {}, must be 8 or 16", *bits));
     const std::size_t size = plane_.pixels();
-    const auto stored = reader.pixels(size * static_cast<std::size_t>(*bits) / 8);
+    const auto stored = reader.pixels(size * static_cast<std::size_t>(bits->allocated) / 8);
     if (!stored) return stored.error();
     if (i == 0) {
       map = make_map(plane_, grid, reader);
@@ -369,7 +447,12 @@ class SeriesReader {
     }
     auto* slice = map->labels.data() + size * static_cast<std::size_t>(grid.slice_of_places[i]);
     for (std::size_t k = 0; k < size; ++k) {
-      const int label = *bits == 8 ? (*stored)[k] : (*stored)[2 * k] | (*stored)[2 * k + 1] << 8;
+      const int label = bits->value(*stored, k);
+      if (label < 0)
+        return reader.error(fmt::format("pixel ({}, {}) is {}, which is no label: {}",
+                                        k % static_cast<std::size_t>(plane_.columns),
+                                        k / static_cast<std::size_t>(plane_.columns), label,
+                                        "labels are whole numbers from 0 to 65535"));
       slice[k] = static_cast<std::uint16_t>(label);
       if (!labels_.add(slice[k])) return reader.error(LabelCount::error());
     }
@@ -397,7 +480,7 @@ Result<LabelMap> read_dicom(const fs::path& path) {
   const auto file = open(path);
   if (!file) return file.error();
   Reader reader(**file, path.string());
-  if (text_of(reader.data(), DCM_SOPClassUID) != UID_SegmentationStorage)
+  if (!is_segmentation(text_of(reader.data(), DCM_SOPClassUID)))
     return reader.error("is one image: import the folder of its series, or a segmentation");
   return SegmentationReader(reader).run();
 }

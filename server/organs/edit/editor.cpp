@@ -53,6 +53,12 @@ bool is_name(const std::string& name) {
   });
 }
 
+// nodes: ascending.
+bool lies_in(const mesh::Tet& tet, const std::vector<NodeIndex>& nodes) {
+  return std::ranges::all_of(
+      tet, [&](NodeIndex node) { return std::ranges::binary_search(nodes, node); });
+}
+
 }  // namespace
 
 Editor::Editor(organ::Organ organ) : organ_(std::move(organ)), first_(content()), saved_(first_) {}
@@ -62,7 +68,8 @@ std::size_t Editor::Content::bytes() const {
                     node_masses_kg.size() * sizeof(double) +
                     depth_table.rows.size() * sizeof(depth_table.rows[0]);
   for (const auto& region : regions)
-    sum += sizeof region + region.name.size() + region.nodes.size() * sizeof(NodeIndex);
+    sum += sizeof region + region.name.size() + region.nodes.size() * sizeof(NodeIndex) +
+           region.tets.size() * sizeof(TetIndex);
   return sum;
 }
 
@@ -150,17 +157,34 @@ Result<std::size_t> Editor::add_region(const std::string& name, std::span<const 
 bool Editor::add_to_region(std::size_t region, std::span<const NodeIndex> nodes) {
   if (region >= organ_.regions.size()) return false;
   return change([&] {
-    auto& own = organ_.regions[region].nodes;
-    own = united(own, ascending(nodes, organ_.mesh.node_count()));
+    auto& own = organ_.regions[region];
+    const auto added = without(ascending(nodes, organ_.mesh.node_count()), own.nodes);
+    own.nodes = united(own.nodes, added);
+    if (own.tets.empty()) return;
+    // Those that the new nodes complete.
+    for (std::size_t t = 0; t < organ_.mesh.tets.size(); ++t)
+      if (const auto& tet = organ_.mesh.tets[t];
+          lies_in(tet, own.nodes) && std::ranges::any_of(tet, [&](NodeIndex node) {
+            return std::ranges::binary_search(added, node);
+          }))
+        own.tets.emplace_back(t);
+    std::ranges::sort(own.tets);
   });
 }
 
 bool Editor::take_from_region(std::size_t region, std::span<const NodeIndex> nodes) {
   if (region >= organ_.regions.size()) return false;
-  auto rest = without(organ_.regions[region].nodes, ascending(nodes, organ_.mesh.node_count()));
-  if (rest.size() == organ_.regions[region].nodes.size()) return false;
-  if (!holds_an_element(organ_.mesh, rest)) return remove_region(region);
-  return change([&] { organ_.regions[region].nodes = std::move(rest); });
+  const auto& own = organ_.regions[region];
+  auto rest = without(own.nodes, ascending(nodes, organ_.mesh.node_count()));
+  if (rest.size() == own.nodes.size()) return false;
+  auto tets = own.tets;
+  std::erase_if(tets, [&](TetIndex t) { return !lies_in(organ_.mesh.tets[t.value], rest); });
+  if (own.tets.empty() ? !holds_an_element(organ_.mesh, rest) : tets.empty())
+    return remove_region(region);
+  return change([&] {
+    organ_.regions[region].nodes = std::move(rest);
+    organ_.regions[region].tets = std::move(tets);
+  });
 }
 
 bool Editor::remove_region(std::size_t region) {

@@ -1,8 +1,9 @@
 #pragma once
 
 // Reader of the meshes in decks of Abaqus and CalculiX (.inp): *NODE and *ELEMENT of type C3D4.
-// Sets of elements become regions (*ELEMENT, ELSET=; *ELSET), *NSET sets of nodes; other keywords
-// are read over with their lines. Shells and trusses of three or two nodes are skipped.
+// Sets of elements become regions (*ELEMENT, ELSET=; *ELSET) in the file's order, *NSET and sets of
+// shells and trusses of three or two nodes become sets of nodes; other keywords are read over with
+// their lines, which is said.
 //
 // Source: Abaqus keywords reference guide; Dhondt: CalculiX CrunchiX user's manual, chapter
 // "Input deck format".

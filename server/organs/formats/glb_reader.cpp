@@ -91,6 +91,14 @@ class GlbReader {
     surface.unit_m = 1;
     surface.axes = surface::Axes::LeftHeadFront;  // y up, z forward (3.4)
     if (corners_.empty()) fail("has no triangles");
+    if (skipped_ > 0)
+      surface.left_out.push_back("left out " + std::to_string(skipped_) +
+                                 " lists of points or lines");
+    if (const Json* moved = member(json_, "animations"); moved != nullptr && !moved->empty())
+      surface.left_out.push_back("left out its animations: taken in its pose at rest");
+    if (const Json* scenes = member(json_, "scenes"); scenes->size() > 1)
+      surface.left_out.push_back("left out the other " + std::to_string(scenes->size() - 1) +
+                                 " scenes");
     if (picture_) {
       surface.picture = std::string(view(*find(element("images", *picture_), "bufferView")));
       if (lacks_place_) fault_ = "some of its meshes have no place in the picture";
@@ -250,9 +258,21 @@ class GlbReader {
       if (member(node, "skin") != nullptr)
         fail(name + " has a skin: save it in the pose that is meant");
       const Motion motion = above * motion_of(node, name);
-      if (const auto mesh = find(node, "mesh")) add_mesh(*mesh, motion);
+      if (const auto mesh = find(node, "mesh")) {
+        check_weights(node, element("meshes", *mesh), name);
+        add_mesh(*mesh, motion);
+      }
       add_nodes(node, "children", name, motion, waiting);
     }
+  }
+
+  // Those of a node go before those of its mesh.
+  static void check_weights(const Json& node, const Json& mesh, const std::string& name) {
+    const Json* weights = member(node, "weights");
+    if (weights == nullptr) weights = member(mesh, "weights");
+    if (weights == nullptr || std::ranges::all_of(*weights, [](const Json& w) { return w == 0; }))
+      return;
+    fail(name + " has weights that change its shape: save it in the shape that is meant");
   }
 
   static void add_nodes(const Json& of, const char* key, const std::string& name,
@@ -302,7 +322,10 @@ class GlbReader {
     if (primitives_ > kMostPrimitives) fail("has more than 100,000 primitives in all of its nodes");
     for (std::size_t i = 0; i < primitives->size(); ++i) {
       const std::size_t mode = find((*primitives)[i], "mode").value_or(kTriangles);
-      if (mode < kTriangles) continue;
+      if (mode < kTriangles) {
+        ++skipped_;
+        continue;
+      }
       const std::string its_name = name + ".primitives[" + std::to_string(i) + "]";
       if (mode > kTriangles) fail(its_name + " is a strip or fan: save it as triangles");
       add_triangles((*primitives)[i], its_name, motion);
@@ -391,6 +414,7 @@ class GlbReader {
   std::string_view binary_;
   Json json_;
   std::size_t primitives_ = 0;  // of the nodes so far
+  std::size_t skipped_ = 0;     // lists of points or lines
   std::vector<Vec3d> corners_;
   std::vector<std::array<std::array<double, 2>, 3>> texture_;
   std::optional<std::size_t> picture_;  // number of the image

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <string>
@@ -69,7 +70,7 @@ class Version2 {
     return read_sections(in_, mesh_, [this](const std::string& section) {
       return section == "$Nodes"      ? nodes()
              : section == "$Elements" ? elements()
-                                      : skip_gmsh_section(in_);
+                                      : skip_gmsh_section(in_, mesh_);
     });
   }
 
@@ -125,7 +126,8 @@ class Version2 {
     }
     for (int i = 0; i < node_count; ++i)
       if (auto s = numbers_.whole32("a node of an element", nodes[i]); !s) return s;
-    return mesh_.add_element(id, type, physical, {nodes, static_cast<std::size_t>(node_count)});
+    return mesh_.add_element(id, type, {&physical, 1},
+                             {nodes, static_cast<std::size_t>(node_count)});
   }
 
   TextReader& in_;
@@ -145,7 +147,7 @@ class Version4 {
              : section == "$Elements" ? elements()
              : section == "$PartitionedEntities"
                  ? Status(in_.error("is partitioned: save the whole mesh"))
-                 : skip_gmsh_section(in_);
+                 : skip_gmsh_section(in_, mesh_);
     });
   }
 
@@ -174,11 +176,14 @@ class Version4 {
     if (auto s = numbers_.whole64("the number of physical groups", groups); !s) return s;
     if (auto s = in_.check_count(groups, numbers_.is_binary() ? 4 : 2, "physical groups"); !s)
       return s;
+    if (groups > kMaxGmshTags) return in_.error("an entity has more than 1000 physical groups");
+    auto& physical = physical_[{dimension, tag}];
     for (std::int64_t i = 0; i < groups; ++i) {
       std::int64_t group = 0;
       if (auto s = numbers_.whole32("a physical group", group); !s) return s;
       // The sign is an orientation.
-      if (i == 0) physical_[{dimension, tag}] = group < 0 ? -group : group;
+      group = group < 0 ? -group : group;
+      if (std::ranges::find(physical, group) == physical.end()) physical.push_back(group);
     }
     if (dimension == 0) return {};
     if (auto s = numbers_.whole64("the number of bounding entities", bounding); !s) return s;
@@ -275,8 +280,7 @@ class Version4 {
     if (auto s = block_header("elements", dimension, tag, type, count, total - found); !s) return s;
     const auto node_count = mesh_.node_count_of("a block of elements", type);
     if (!node_count) return node_count.error();
-    const auto group = physical_.find({dimension, tag});
-    const std::int64_t physical = group == physical_.end() ? 0 : group->second;
+    const auto& physical = physical_[{dimension, tag}];
     auto status = numbers_.repeat(count, [&]() -> Status {
       std::int64_t id = 0, nodes[4] = {};
       if (auto s = numbers_.whole64("the number of an element", id); !s) return s;
@@ -291,7 +295,8 @@ class Version4 {
   TextReader& in_;
   Numbers numbers_;
   GmshMesh& mesh_;
-  std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> physical_;  // dimension, number
+  // Groups of each entity, by dimension and number.
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::int64_t>> physical_;
 };
 
 }  // namespace

@@ -29,7 +29,7 @@ class LineReader {
       else if (in_.line() == "$PhysicalNames")
         status = read_physical_names(in_, mesh_);
       else
-        status = skip_gmsh_section(in_);
+        status = skip_gmsh_section(in_, mesh_);
       if (!status) return status;
     }
     return {};
@@ -111,7 +111,8 @@ class LineReader {
     }
     if (!in_.word().empty())
       return in_.error(name + ": more than " + std::to_string(*node_count) + " nodes");
-    return mesh_.add_element(id, type, physical, {nodes, static_cast<std::size_t>(*node_count)});
+    return mesh_.add_element(id, type, {&physical, 1},
+                             {nodes, static_cast<std::size_t>(*node_count)});
   }
 
   Status tags(const std::string& name, std::int64_t& physical) {

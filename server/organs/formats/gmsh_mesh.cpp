@@ -1,5 +1,6 @@
 #include "server/organs/formats/gmsh_mesh.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace trocar::formats {
@@ -9,6 +10,7 @@ struct GmshKind {
   std::int64_t type;
   int nodes, dimension;
 };
+constexpr std::size_t kMostGroupGrowth = 4;  // of groups beyond the file
 constexpr GmshKind kGmshKinds[] = {{15, 1, 0}, {1, 2, 1}, {2, 3, 2}, {4, 4, 3}};
 
 const GmshKind* find_gmsh_kind(std::int64_t type) {
@@ -74,7 +76,8 @@ std::string GmshMesh::element_name(std::int64_t id, std::int64_t type) const {
   return type == 4 ? "tet " + std::to_string(raw_.tets.size() + 1) + " (" + name + ")" : name;
 }
 
-Status GmshMesh::add_element(std::int64_t id, std::int64_t type, std::int64_t physical,
+Status GmshMesh::add_element(std::int64_t id, std::int64_t type,
+                             std::span<const std::int64_t> physical,
                              std::span<const std::int64_t> nodes) {
   const GmshKind* kind = find_gmsh_kind(type);
   TROCAR_ASSERT(kind != nullptr && nodes.size() == static_cast<std::size_t>(kind->nodes));
@@ -90,14 +93,24 @@ Status GmshMesh::add_element(std::int64_t id, std::int64_t type, std::int64_t ph
         return in_.error(element_name(id, type) + " uses node " + std::to_string(nodes[i]) +
                          " twice");
   }
+  grown_ += nodes.size() * (std::max<std::size_t>(physical.size(), 1) - 1);
+  if (grown_ / kMostGroupGrowth > in_.text().size())
+    return in_.error("elements in many groups make the groups far larger than the file");
+  const auto groups = std::ranges::count_if(physical, [](auto number) { return number != 0; });
+  for (const auto number : physical) {
+    if (number == 0) continue;
+    if (type == 4) {
+      volumes_[number].push_back(raw_.tets.size());
+    } else {
+      auto& group = groups_[{kind->dimension, number}];
+      group.insert(group.end(), tet.begin(), tet.begin() + kind->nodes);
+    }
+  }
   if (type == 4) {
     raw_.tets.push_back(tet);
     raw_.element_ids.push_back(id);
-    raw_.tet_regions.push_back(physical);
-    has_region_ = has_region_ || physical != 0;
-  } else if (physical != 0) {
-    auto& group = groups_[{kind->dimension, physical}];
-    group.insert(group.end(), tet.begin(), tet.begin() + kind->nodes);
+  } else if (groups == 0) {
+    ++skipped_;
   }
   return {};
 }
@@ -110,22 +123,26 @@ Status GmshMesh::add_physical_name(std::int64_t dimension, std::int64_t number,
   if (quoted.size() < 2 || quoted.front() != '"' || quoted.back() != '"')
     return in_.error("the name of a physical group must stand in quotation marks");
   const std::string name = plain_name(quoted.substr(1, quoted.size() - 2));
-  if (dimension == 3)
-    raw_.region_names[number] = name;
-  else
-    names_[{dimension, number}] = name;
+  names_[{dimension, number}] = name;
   return {};
 }
 
 Result<mesh::RawTets> GmshMesh::finish() {
   if (!has_nodes_) return in_.error("the file ends without a $Nodes section");
   if (!has_elements_) return in_.error("the file ends without an $Elements section");
-  if (!has_region_) raw_.tet_regions.clear();
-  for (auto& [key, nodes] : groups_) {
-    const auto named = names_.find(key);
-    raw_.node_sets.push_back(
-        {named != names_.end() ? named->second : std::to_string(key.second), std::move(nodes)});
-  }
+  const auto name_of = [&](std::int64_t dimension, std::int64_t number, const char* begin) {
+    const auto named = names_.find({dimension, number});
+    return named != names_.end() ? named->second : begin + std::to_string(number);
+  };
+  mesh::RegionSets regions(raw_.tets.size());
+  for (const auto& [number, tets] : volumes_) regions.add(name_of(3, number, "region "), tets);
+  std::move(regions).finish(raw_);
+  for (auto& [key, nodes] : groups_)
+    raw_.node_sets.push_back({name_of(key.first, key.second, ""), std::move(nodes)});
+  if (skipped_ > 0)
+    raw_.left_out.push_back("left out " + std::to_string(skipped_) +
+                            " points, lines and triangles of no physical group");
+  if (!left_out_.empty()) raw_.left_out.push_back("left out: " + mesh::list_of(left_out_));
   return std::move(raw_);
 }
 

@@ -31,8 +31,8 @@ class GmshMesh {
   Status begin_elements();
   // Nodes of an element of that type. Error: unknown or of no use here.
   Result<int> node_count_of(const std::string& element, std::int64_t type) const;
-  // physical: the number of its group, 0 without one. Nodes by the file's numbers.
-  Status add_element(std::int64_t id, std::int64_t type, std::int64_t physical,
+  // physical: the numbers of its groups, 0 is none. Nodes by the file's numbers.
+  Status add_element(std::int64_t id, std::int64_t type, std::span<const std::int64_t> physical,
                      std::span<const std::int64_t> nodes);
   // "tet 11 (element 705)", or "element 705" of another type; of the element that comes next.
   std::string element_name(std::int64_t id, std::int64_t type) const;
@@ -40,15 +40,21 @@ class GmshMesh {
   // Dimension, number and "name" in quotation marks, as a line of $PhysicalNames.
   Status add_physical_name(std::int64_t dimension, std::int64_t number, std::string_view quoted);
 
+  void leave_out(std::string_view section) { left_out_.emplace_back(section); }
+
   Result<mesh::RawTets> finish();
 
  private:
   TextReader& in_;
-  bool has_nodes_ = false, has_elements_ = false, has_region_ = false;
+  bool has_nodes_ = false, has_elements_ = false;
   mesh::RawTets raw_;
   NodeNumbers numbers_;
   std::map<std::pair<std::int64_t, std::int64_t>, std::string> names_;  // by dimension and number
   std::map<std::pair<std::int64_t, std::int64_t>, std::vector<NodeIndex>> groups_;
+  std::map<std::int64_t, std::vector<std::size_t>> volumes_;  // tets of each group
+  std::size_t grown_ = 0;              // numbers in groups beyond the first one of each element
+  std::size_t skipped_ = 0;            // points, lines and triangles of no group
+  std::vector<std::string> left_out_;  // sections
 };
 
 // Versions 1 and 2.2 as text, from the line behind the format line on.
@@ -63,7 +69,7 @@ Status read_gmsh_count(TextReader& reader, std::string_view section, std::string
 // The line that closes a section; `end`: "$EndNodes". Behind: it is the next line, not this one.
 Status need_gmsh_end(TextReader& reader, std::string_view end, bool is_behind = true);
 // Reads a section that is about nothing of interest, up to its $End line.
-Status skip_gmsh_section(TextReader& reader);
+Status skip_gmsh_section(TextReader& reader, GmshMesh& mesh);
 // The lines of $PhysicalNames.
 Status read_physical_names(TextReader& reader, GmshMesh& mesh);
 

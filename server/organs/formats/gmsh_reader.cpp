@@ -52,7 +52,8 @@ Status need_gmsh_end(TextReader& in, std::string_view end, bool is_behind) {
   return in.error("expected " + std::string(end) + ", found " + shown(in.line()));
 }
 
-Status skip_gmsh_section(TextReader& in) {
+Status skip_gmsh_section(TextReader& in, GmshMesh& mesh) {
+  if (in.line() != "$Comments") mesh.leave_out(in.line());
   const std::string name(in.line().substr(std::min<std::size_t>(1, in.line().size())));
   const auto begins =
       in.error("section " + shown("$" + name) + " is never closed by " + shown("$End" + name));

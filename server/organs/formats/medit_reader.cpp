@@ -71,6 +71,8 @@ class MeditReader {
       return in_.error("keyword " + shown(keyword) + " is not known");
     std::int64_t count = 0;
     if (auto s = begin(keyword, skipped->numbers * 2, count); !s) return s;
+    if (count > 0)
+      tets_.raw.left_out.push_back("left out " + std::to_string(count) + " " + keyword);
     double ignored = 0;
     for (std::int64_t i = 0; i < count * skipped->numbers; ++i)
       if (auto s = in_.read_number("a number of " + keyword, ignored); !s) return s;

@@ -1,7 +1,6 @@
 #include "server/organs/formats/mesh_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <variant>
 
@@ -13,6 +12,7 @@
 #include "server/organs/formats/ply_reader.h"
 #include "server/organs/formats/stl_reader.h"
 #include "server/organs/formats/tetgen_reader.h"
+#include "server/organs/formats/text_reader.h"
 #include "server/organs/formats/vtu_reader.h"
 
 namespace trocar::formats {
@@ -21,9 +21,7 @@ namespace {
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30;
 
 std::string lower_ending(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
+  return lower(path.extension().string());
 }
 
 template <typename T>
@@ -66,6 +64,9 @@ Result<std::string> read_foreign_file(const std::filesystem::path& path) {
 }
 
 Result<TetsOrSurface> parse_mesh(std::string_view text, const std::string& name) {
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+    return Error{ErrorCode::BadFile, name + ": is in UTF-16: save it in UTF-8"};
+  text = behind_mark(text);
   auto result = parse(text, name);
   if (!result) return result;
   auto* surface = std::get_if<surface::RawSurface>(&*result);
@@ -104,7 +105,8 @@ Result<TetsOrSurface> read_mesh_file(const std::filesystem::path& path) {
     if (!nodes) return nodes.error();
     const auto elements = read_foreign_file(element_path);
     if (!elements) return elements.error();
-    return either(parse_tetgen(*nodes, node_path.string(), *elements, element_path.string()));
+    return either(parse_tetgen(behind_mark(*nodes), node_path.string(), behind_mark(*elements),
+                               element_path.string()));
   }
   const auto text = read_foreign_file(path);
   if (!text) return text.error();

@@ -97,6 +97,7 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
   surface::RawSurface surface;
   std::vector<ObjFace> faces;
   std::vector<std::array<double, 2>> places;  // in a picture
+  std::size_t skipped = 0;                    // points and lines
   while (in.next_line()) {
     const auto keyword = in.word();
     if (keyword.empty()) continue;
@@ -119,6 +120,8 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
       faces.push_back(std::move(face));
     } else if (std::ranges::find(kSkippedKeywords, keyword) == std::end(kSkippedKeywords)) {
       return in.error(shown(keyword) + " is not known: save the surface as triangles");
+    } else {
+      skipped += keyword == "p" || keyword == "l";
     }
   }
   std::int64_t number = 0;
@@ -128,6 +131,8 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
       return Error{ErrorCode::BadFile,
                    name + ":" + std::to_string(face.line) + ": " + s.error().message};
   add_texture(faces, cuts, places, name, surface);
+  if (skipped > 0)
+    surface.left_out.push_back("left out " + std::to_string(skipped) + " points and lines");
   return surface;
 }
 

@@ -195,6 +195,9 @@ class PlyReader {
       return in_.error("vertices need the properties x, y and z");
     if (element.name == "face" && !has("vertex_indices") && !has("vertex_index"))
       return in_.error("faces need the list vertex_indices");
+    if (element.name != "vertex" && element.name != "face" && element.count > 0)
+      surface_.left_out.push_back("left out " + std::to_string(element.count) + " elements " +
+                                  shown(element.name));
     for (std::int64_t i = 1; i <= element.count; ++i)
       if (auto s = read_one(element, i); !s) return s;
     return {};

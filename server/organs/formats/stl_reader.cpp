@@ -41,22 +41,23 @@ Result<surface::RawSurface> parse_binary(std::string_view text, const std::strin
   return weld(corners);
 }
 
-// Any number of solids after one another; each begins and ends with a line of its own.
+// Any number of solids after one another; each begins and ends with a line of its own. Keywords are
+// of small or large letters.
 Result<surface::RawSurface> parse_text(std::string_view text, const std::string& name) {
   TextReader in(text, name);
   std::vector<Vec3d> corners;
   const auto expect = [&](std::initializer_list<std::string_view> words) -> Status {
     for (const auto word : words)
-      if (const auto found = in.token(); found != word)
+      if (const auto found = in.token(); lower(found) != word)
         return found.empty()
                    ? in.error("the file ends before '" + std::string(word) + "'")
                    : in.error("expected '" + std::string(word) + "', found " + shown(found));
     return {};
   };
   while (in.next_filled_line()) {
-    if (in.word() != "solid") return in.error("expected 'solid', found " + shown(in.line()));
+    if (lower(in.word()) != "solid") return in.error("expected 'solid', found " + shown(in.line()));
     if (auto s = in.need_line("solid"); !s) return s.error();
-    while (in.line().starts_with("facet")) {
+    while (lower(in.line().substr(0, 5)) == "facet") {
       if (auto s = expect({"facet", "normal"}); !s) return s.error();
       for (int i = 0; i < 3; ++i)
         if (in.token().empty()) return in.error("the file ends inside a normal");
@@ -73,7 +74,7 @@ Result<surface::RawSurface> parse_text(std::string_view text, const std::string&
       if (auto s = expect({"endloop", "endfacet"}); !s) return s.error();
       if (auto s = in.need_line("solid"); !s) return s.error();
     }
-    if (in.word() != "endsolid")
+    if (lower(in.word()) != "endsolid")
       return in.error("expected 'facet' or 'endsolid', found " + shown(in.line()));
   }
   return weld(corners);
@@ -92,7 +93,7 @@ Result<surface::RawSurface> parse_stl(std::string_view text, const std::string& 
   const auto first = std::min(text.find_first_not_of(" \t\r\n"), text.size());
   const auto begin = text.substr(0, 512);
   const bool has_zeros = begin.find('\0') != std::string_view::npos;
-  if (!fits && !has_zeros && text.substr(first).starts_with("solid")) return parse_text(text, name);
+  if (!fits && !has_zeros && lower(text.substr(first, 5)) == "solid") return parse_text(text, name);
   return parse_binary(text, name);
 }
 

@@ -1,5 +1,7 @@
 #include "server/organs/formats/tetgen_reader.h"
 
+#include <cmath>
+
 #include "server/organs/formats/numbered_tets.h"
 #include "server/organs/formats/text_reader.h"
 
@@ -90,11 +92,16 @@ Result<mesh::RawTets> parse_tetgen(std::string_view nodes, const std::string& no
     double region = 0;
     if (auto s = read_rest(in, head->attributes, region); !s) return s.error();
     if (head->attributes == 0) continue;
-    if (!(region > -1e15 && region < 1e15))
-      return in.error("element " + std::to_string(number) + ": its region is beyond 1e15");
+    if (!(region > -1e15 && region < 1e15 && region == std::floor(region)))
+      return in.error("element " + std::to_string(number) +
+                      ": its region must be a whole number of at most 1e15");
     tets.raw.tet_regions.push_back(static_cast<std::int64_t>(region));
   }
   if (in.next_filled_line()) return in.error("more elements than the first line announces");
+  if (point_head->attributes > 0)
+    tets.raw.left_out.push_back("left out the attributes and markers of points");
+  if (head->attributes > 1)
+    tets.raw.left_out.push_back("left out the attributes of elements behind the first one");
   return std::move(tets.raw);
 }
 

@@ -64,6 +64,10 @@ class TextReader {
   std::string_view line_;
 };
 
+// Letters of ASCII made small.
+std::string lower(std::string_view text);
+// The text behind a byte order mark, if it begins with that of UTF-8.
+std::string_view behind_mark(std::string_view text);
 // A part of a foreign file made safe to print on one line, in quotation marks.
 std::string shown(std::string_view text);
 // A name from a foreign file as a name of ours: printable, not empty, at most 100 bytes.

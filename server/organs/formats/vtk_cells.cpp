@@ -1,6 +1,7 @@
 #include "server/organs/formats/vtk_cells.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "common/base/assert.h"
@@ -44,6 +45,27 @@ bool is_region_name(std::string_view name) {
   return std::ranges::find(kNames, name) != std::end(kNames);
 }
 
+void take_regions(const std::vector<double>& numbers, const std::string& data, VtkCells& cells) {
+  constexpr double kLargest = 1e15;
+  const auto part = std::ranges::find_if_not(numbers, [](double number) {
+    return number == std::floor(number) && std::abs(number) <= kLargest;
+  });
+  if (part != numbers.end())
+    cells.left_out.push_back(data + ", which is no whole number in cell " +
+                             std::to_string(part - numbers.begin()));
+  else
+    for (const double number : numbers) cells.regions.push_back(static_cast<std::int64_t>(number));
+}
+
+std::string left_out_line(const std::vector<std::string>& data) {
+  std::string text;
+  for (const auto& one : data) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "left out: " : ", ") + one;
+  }
+  return text;
+}
+
 Result<mesh::RawTets> tets_of(VtkCells cells, const std::string& name) {
   const auto error = [&](std::size_t cell, const std::string& what) {
     return Error{ErrorCode::BadFile, name + ": cell " + std::to_string(cell) + " " + what};
@@ -56,6 +78,7 @@ Result<mesh::RawTets> tets_of(VtkCells cells, const std::string& name) {
   std::iota(raw.node_ids.begin(), raw.node_ids.end(), std::int64_t{0});
   const auto points = static_cast<std::int64_t>(raw.positions.size());
   std::int64_t begin = 0;
+  std::size_t skipped = 0;
   for (std::size_t c = 0; c < cells.types.size(); ++c) {
     const auto type = cells.types[c], count = cells.ends[c] - begin;
     const auto kind = std::ranges::find(kVtkKinds, type, &VtkKind::type);
@@ -78,11 +101,17 @@ Result<mesh::RawTets> tets_of(VtkCells cells, const std::string& name) {
           return error(c, "uses node " + std::to_string(node) + " twice");
     }
     begin = cells.ends[c];
-    if (type != kTetrahedron) continue;
+    if (type != kTetrahedron) {
+      ++skipped;
+      continue;
+    }
     raw.tets.push_back(tet);
     raw.element_ids.push_back(static_cast<std::int64_t>(c));
     if (!cells.regions.empty()) raw.tet_regions.push_back(cells.regions[c]);
   }
+  if (skipped > 0)
+    raw.left_out.push_back("left out " + std::to_string(skipped) + " points, lines and triangles");
+  if (!cells.left_out.empty()) raw.left_out.push_back(left_out_line(cells.left_out));
   return raw;
 }
 

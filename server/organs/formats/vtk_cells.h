@@ -21,10 +21,16 @@ struct VtkCells {
   std::vector<std::int64_t> ends;     // of each cell in `corners`, ascending
   std::vector<std::int64_t> types;    // one a cell
   std::vector<std::int64_t> regions;  // one a cell, or empty
+  std::vector<std::string> left_out;  // data, such as "point data 'heat'"
 };
 
 // Whether cell data of that name number the regions of a mesh.
 bool is_region_name(std::string_view name);
+
+// Numbers of cells that are stored as fractions, if all of them are whole: else they are left out.
+void take_regions(const std::vector<double>& numbers, const std::string& data, VtkCells& cells);
+// The line for data that are left out; empty without.
+std::string left_out_line(const std::vector<std::string>& data);
 
 // Tetrahedra of the cells; vertices, lines and triangles are skipped. Errors name the cell, counted
 // from 0 as VTK does, and begin with `name`.

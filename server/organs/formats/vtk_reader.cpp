@@ -15,12 +15,13 @@
 namespace trocar::formats {
 namespace {
 
-// Bytes of a number of that name; 0: unknown, or of no fixed size.
+// Bytes of a number of that name; 0: unknown, or of no fixed size. VTK writes vtkIdType as an int,
+// whatever its own has.
 std::int64_t vtk_size_of(std::string_view type) {
   static constexpr std::pair<std::string_view, std::int64_t> kSizes[] = {
       {"char", 1},          {"unsigned_char", 1}, {"short", 2},        {"unsigned_short", 2},
       {"int", 4},           {"float", 4},         {"unsigned_int", 4}, {"long", 8},
-      {"unsigned_long", 8}, {"double", 8},        {"vtkIdType", 8},    {"vtktypeint64", 8},
+      {"unsigned_long", 8}, {"double", 8},        {"vtkIdType", 4},    {"vtktypeint64", 8},
       {"vtktypeint32", 4}};
   const auto at =
       std::ranges::find(kSizes, type, &std::pair<std::string_view, std::int64_t>::first);
@@ -45,6 +46,9 @@ class VtkReader {
     if (!has_points_) return in_.error("the file ends without POINTS");
     if (is_surface_) {
       if (!has_cells_) return in_.error("the file ends without POLYGONS");
+      if (skipped_ > 0)
+        surface_.left_out.push_back("left out " + std::to_string(skipped_) + " points and lines");
+      if (!cells_.left_out.empty()) surface_.left_out.push_back(left_out_line(cells_.left_out));
       return TetsOrSurface(std::move(surface_));
     }
     if (!has_cells_) return in_.error("the file ends without CELLS");
@@ -170,7 +174,10 @@ class VtkReader {
                         : counts_and_corners(first, second, list);
         !s)
       return s;
-    if (!kept) return {};
+    if (!kept) {
+      skipped_ += list.ends.size();
+      return {};
+    }
     if (!is_surface_) {
       cells_.corners = std::move(list.corners);
       cells_.ends = std::move(list.ends);
@@ -337,27 +344,39 @@ class VtkReader {
             in_.check_count(components * tuples, is_binary_ ? vtk_size_of(type) : 2, "numbers");
         !s)
       return s;
-    const bool is_kept = is_cell_data_ && data_count_ >= 0 && components == 1 && !is_surface_ &&
-                         type != "float" && type != "double" && is_region_name(name) &&
-                         tuples == static_cast<std::int64_t>(cells_.ends.size()) &&
-                         cells_.regions.empty();
     const std::int64_t count = components * tuples;
-    if (is_binary_ && !is_kept) {
+    const std::string data = (data_count_ < 0 ? "field data "
+                              : is_cell_data_ ? "cell data "
+                                              : "point data ") +
+                             shown(name);
+    if (is_cell_data_ && data_count_ >= 0 && components == 1 && !is_surface_ &&
+        is_region_name(name) && tuples == static_cast<std::int64_t>(cells_.ends.size()) &&
+        cells_.regions.empty())
+      return regions(data, type, count);
+    cells_.left_out.push_back(data);
+    if (is_binary_) {
       const auto bytes = static_cast<std::size_t>(count * vtk_size_of(type));
       if (bytes > 0 && in_.bytes(bytes).empty())
         return in_.error("the file ends inside " + shown(name) + ": it is cut off");
       return {};
     }
-    for (std::int64_t i = 0; i < count; ++i) {
-      std::int64_t region = 0;
-      if (!is_kept) {
-        if (in_.token().empty())
-          return in_.error("the file ends inside " + shown(name) + ": it is cut off");
-        continue;
-      }
-      if (auto s = number(type, "a number of " + shown(name), region); !s) return s;
-      cells_.regions.push_back(region);
+    for (std::int64_t i = 0; i < count; ++i)
+      if (in_.token().empty())
+        return in_.error("the file ends inside " + shown(name) + ": it is cut off");
+    return {};
+  }
+
+  Status regions(const std::string& data, const std::string& type, std::int64_t count) {
+    const std::string what = "a number of " + data;
+    if (type == "float" || type == "double") {
+      std::vector<double> numbers;
+      for (std::int64_t i = 0; i < count; ++i)
+        if (auto s = number(type, what, numbers.emplace_back()); !s) return s;
+      take_regions(numbers, data, cells_);
+      return {};
     }
+    for (std::int64_t i = 0; i < count; ++i)
+      if (auto s = number(type, what, cells_.regions.emplace_back()); !s) return s;
     return {};
   }
 
@@ -372,6 +391,7 @@ class VtkReader {
   bool is_binary_ = false, is_surface_ = false, has_points_ = false, has_cells_ = false;
   bool is_cell_data_ = false;
   std::int64_t data_count_ = -1;  // -1: no data yet
+  std::size_t skipped_ = 0;       // points and lines of a surface
   VtkCells cells_;
   surface::RawSurface surface_;
 };

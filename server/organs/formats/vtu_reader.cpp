@@ -84,6 +84,9 @@ class VtuReader {
   }
 
   Status take_array(const XmlTag& tag) {
+    const std::string name(tag.value("Name"));
+    if (parent_ == "PointData" || parent_ == "FieldData")
+      left_out_.push_back((parent_ == "PointData" ? "point data " : "field data ") + shown(name));
     if (!has_piece_ || (parent_ != "Points" && parent_ != "Cells" && parent_ != "CellData"))
       return {};
     Array array{source_, std::string(tag.value("NumberOfComponents", "1"))};
@@ -92,14 +95,15 @@ class VtuReader {
     if (tag.kind == XmlTag::Kind::Open) array.source.content = tags_.content();
     if (array.source.format == "appended" && !parse_whole(tag.value("offset"), array.source.offset))
       return tags_.error("appended data need an offset");
-    const std::string name(tag.value("Name"));
     const std::string key = std::string(parent_) + "/" + (parent_ == "Points" ? "" : name);
     if (parent_ != "CellData") {
       if (!arrays_.emplace(key, std::move(array)).second)
         return tags_.error("a second array " + shown(name) + " in " + std::string(parent_));
-    } else if (is_region_name(name) && array.components == "1" &&
-               !array.source.type.starts_with("Float")) {
+    } else if (is_region_name(name) && array.components == "1" && !arrays_.contains("CellData/")) {
       arrays_.emplace("CellData/", std::move(array));
+      region_data_ = "cell data " + shown(name);
+    } else {
+      left_out_.push_back("cell data " + shown(name));
     }
     return {};
   }
@@ -173,14 +177,27 @@ class VtuReader {
     cells.corners = std::move(*corners);
     cells.ends = std::move(*offsets);
     cells.types = std::move(*types);
-    if (find("CellData/")) {
-      auto regions = wholes("CellData/", "regions");
-      if (!regions) return regions.error();
-      if (static_cast<std::int64_t>(regions->size()) != cells_)
-        return wrong_count("regions", regions->size(), cells_);
-      cells.regions = std::move(*regions);
-    }
+    cells.left_out = std::move(left_out_);
+    if (const Array* regions = find("CellData/"))
+      if (auto s = take_regions_of(regions->source, cells); !s) return s.error();
     return tets_of(std::move(cells), name_);
+  }
+
+  Status take_regions_of(const VtuSource& source, VtkCells& cells) {
+    if (source.type.starts_with("Float")) {
+      const auto numbers = read_vtu_numbers(source);
+      if (!numbers) return fail("regions: " + numbers.error().message);
+      if (static_cast<std::int64_t>(numbers->size()) != cells_)
+        return wrong_count("regions", numbers->size(), cells_);
+      take_regions(*numbers, region_data_, cells);
+      return {};
+    }
+    auto regions = wholes("CellData/", "regions");
+    if (!regions) return regions.error();
+    if (static_cast<std::int64_t>(regions->size()) != cells_)
+      return wrong_count("regions", regions->size(), cells_);
+    cells.regions = std::move(*regions);
+    return {};
   }
 
   XmlTags tags_;
@@ -191,6 +208,8 @@ class VtuReader {
   std::int64_t points_ = 0, cells_ = 0;
   VtuSource source_;  // that which holds for all arrays of the file
   std::map<std::string, Array> arrays_;
+  std::string region_data_;
+  std::vector<std::string> left_out_;
 };
 
 }  // namespace

@@ -13,6 +13,8 @@ namespace {
 constexpr int kMargin = 4;  // voxels around the solid
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 26;
 constexpr double kLargestShare = 0.9;
+constexpr double kDepth = 0.1;         // voxels from the surface from which on it is inside
+constexpr double kLeastInside = 0.05;  // share of a solid's voxels
 constexpr float kFar = 1e20f;
 
 // Squared distances to the nearest zero along one line of samples a step apart: the lower envelope
@@ -69,6 +71,12 @@ Result<LabelSolid> LabelSolid::make(LabelMap map, const std::vector<std::uint16_
   if (auto s = solid.keep_largest_body(name); !s) return s.error();
   solid.measure();
   solid.find_distances();
+  const double limit =
+      -kDepth * std::min({length(solid.map_.steps_m[0]), length(solid.map_.steps_m[1]),
+                          length(solid.map_.steps_m[2])});
+  const auto inside = std::ranges::count_if(solid.distance_m_, [&](float d) { return d < limit; });
+  if (static_cast<double>(inside) * solid.map_.voxel_volume_m3() < kLeastInside * solid.volume_m3_)
+    return Error{ErrorCode::BadFile, name + ": " + solid.thinness()};
   return solid;
 }
 
@@ -158,6 +166,22 @@ Status LabelSolid::keep_largest_body(const std::string& name) {
                 sizes.size() - 2, 100 * (1 - share));
   map_.warnings.push_back(text);
   return {};
+}
+
+std::string LabelSolid::thinness() const {
+  std::size_t thinnest = 0;  // dimension
+  for (std::size_t d = 1; d < 3; ++d)
+    if (map_.size[d] < map_.size[thinnest]) thinnest = d;
+  const bool is_slice = map_.size[thinnest] == 1 + 2 * kMargin;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "%s%.3g mm thick: it has no inside, whatever the number of nodes; take a map of "
+                "thinner voxels",
+                is_slice ? "is one slice, " : "is hardly anywhere thicker than a voxel, at most ",
+                1e3 * (is_slice ? length(map_.steps_m[thinnest])
+                                : std::max({length(map_.steps_m[0]), length(map_.steps_m[1]),
+                                            length(map_.steps_m[2])})));
+  return text;
 }
 
 void LabelSolid::measure() {

@@ -24,8 +24,9 @@ inline constexpr double kVoxelsOverSurface = 1.5;  // area of a voxel surface ov
 class LabelSolid {
  public:
   // labels: which belong to it; none: all but 0. Error: no voxel has one of them, or they are
-  // several bodies of which the largest has less than 90 % of the volume. Smaller ones are dropped
-  // with a warning. `name` starts each error.
+  // several bodies of which the largest has less than 90 % of the volume (smaller ones are dropped
+  // with a warning), or it is one voxel thick nearly all over and has no inside. `name` starts each
+  // error.
   static Result<LabelSolid> make(LabelMap map, const std::vector<std::uint16_t>& labels,
                                  const std::string& name);
 
@@ -49,6 +50,7 @@ class LabelSolid {
   Status keep_largest_body(const std::string& name);
   void measure();
   void find_distances();
+  std::string thinness() const;  // of a solid that has no inside
 
   LabelMap map_;                   // cut to the solid and a margin; what does not belong to it is 0
   std::vector<float> distance_m_;  // one a voxel

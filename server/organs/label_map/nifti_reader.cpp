@@ -73,8 +73,9 @@ class NiftiReader {
       return error("holds its image in another file: save both as one .nii");
     if (bytes_.substr(344, 4) != std::string_view("n+1\0", 4))
       return error("magic is not n+1: it is no NIfTI file");
+    // A slope of 0 says that nothing is scaled, whatever scl_inter is.
     const auto slope = at<float>(112), inter = at<float>(116);
-    if (!((slope == 0 || slope == 1) && inter == 0))
+    if (slope != 0 && !(slope == 1 && inter == 0))
       return error("scl_slope and scl_inter scale the values: a label map has whole labels");
     return {};
   }
@@ -132,10 +133,12 @@ class NiftiReader {
 
   // Columns of the matrix from voxels to the file's coordinates, and its last column.
   Status read_place() {
-    std::array<Vec3d, 3> columns;
+    std::array<Vec3d, 3> columns, of_qform;
     Vec3d origin;
     const auto sform = at<std::int16_t>(254), qform = at<std::int16_t>(252);
     const std::array<double, 3> sizes{at<float>(80), at<float>(84), at<float>(88)};
+    const auto turned = qform > 0 ? rotation(sizes, of_qform) : Status{};
+    const Vec3d origin_of_qform{at<float>(268), at<float>(272), at<float>(276)};
     if (sform > 0) {
       const auto row = [&](std::size_t r, std::size_t c) {
         return double{at<float>(280 + 16 * r + 4 * c)};
@@ -143,19 +146,52 @@ class NiftiReader {
       for (std::size_t c = 0; c < 3; ++c) columns[c] = {row(0, c), row(1, c), row(2, c)};
       origin = {row(0, 3), row(1, 3), row(2, 3)};
     } else if (qform > 0) {
-      if (auto s = rotation(sizes, columns); !s) return s;
-      origin = {at<float>(268), at<float>(272), at<float>(276)};
+      if (!turned) return turned;
+      columns = of_qform;
+      origin = origin_of_qform;
     } else {
       columns = {Vec3d{sizes[0], 0, 0}, Vec3d{0, sizes[1], 0}, Vec3d{0, 0, sizes[2]}};
       map_.warnings.push_back(
           "has neither sform nor qform: which side is left is not known, taken as RAS");
     }
-    // From right, front, head to left, head, front.
-    const auto turned = [&](const Vec3d& v) { return Vec3d{-v.x, v.z, v.y} * scale_; };
-    std::array<Vec3d, 3> steps;
-    for (std::size_t c = 0; c < 3; ++c) steps[c] = turned(columns[c]);
-    if (auto s = set_place(turned(origin), steps, map_); !s) return error(s.error().message);
+    if (auto s = place(origin, columns, map_); !s) return error(s.error().message);
+    if (sform > 0 && qform > 0) compare(columns, origin, turned, of_qform, origin_of_qform);
     return {};
+  }
+
+  // From right, front, head to left, head, front.
+  Status place(const Vec3d& origin, const std::array<Vec3d, 3>& columns, LabelMap& map) const {
+    const auto turned = [&](const Vec3d& v) { return Vec3d{-v.x, v.z, v.y} * scale_; };
+    return set_place(turned(origin), {turned(columns[0]), turned(columns[1]), turned(columns[2])},
+                     map);
+  }
+
+  // Says where sform, which is taken, and qform differ by more than a tenth of a voxel.
+  void compare(const std::array<Vec3d, 3>& columns, const Vec3d& origin, const Status& turned,
+               const std::array<Vec3d, 3>& of_qform, const Vec3d& origin_of_qform) {
+    LabelMap other;
+    if (!turned || !place(origin_of_qform, of_qform, other)) {
+      map_.warnings.push_back("sform and qform disagree: qform gives no place, sform was taken");
+      return;
+    }
+    double farthest = 0;  // of the corners of the map
+    for (int corner = 0; corner < 8; ++corner) {
+      Vec3d apart = origin - origin_of_qform;
+      for (std::size_t d = 0; d < 3; ++d)
+        if (corner >> d & 1) apart += (columns[d] - of_qform[d]) * double(map_.size[d] - 1);
+      farthest = std::max(farthest, length(apart));
+    }
+    constexpr double kTenth = 0.1;
+    if (map_.orientation == other.orientation &&
+        farthest <= kTenth * std::min({length(columns[0]), length(columns[1]), length(columns[2])}))
+      return;
+    map_.warnings.push_back(
+        "sform and qform disagree" +
+        (map_.orientation == other.orientation
+             ? " by up to " + std::to_string(std::lround(1e3 * scale_ * farthest)) + " mm: "
+             : " about the sides: sform says " + map_.orientation + ", qform " + other.orientation +
+                   "; ") +
+        "sform was taken");
   }
 
   Status rotation(const std::array<double, 3>& sizes, std::array<Vec3d, 3>& columns) const {

@@ -4,10 +4,10 @@
 //
 // One volume of whole numbers from 0 to 65535, unscaled, of at most kMaxLabels values beside 0. The
 // stored type is an integer of 8 to 32 bits, a signed one of 64, or a float. The place of its
-// voxels is that of the sform, else of the qform, else of the voxel sizes alone, which is said. The
-// file's coordinates run to the patient's right, front and head (RAS). Errors are one line with the
-// file's name and the header's field. Memory grows with the bytes that are there, to 512 MiB at
-// most.
+// voxels is that of the sform, else of the qform, else of the voxel sizes alone, which is said, as
+// it is where sform and qform disagree. The file's coordinates run to the patient's right, front
+// and head (RAS). Errors are one line with the file's name and the header's field. Memory grows
+// with the bytes that are there, to 512 MiB at most.
 //
 // Source: Cox et al.: A (sort of) new image data format standard: NIfTI-1, 2004; nifti1.h.
 

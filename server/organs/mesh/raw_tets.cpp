@@ -25,6 +25,7 @@ class Builder {
       return error(
           "has no tetrahedra: mesh the volume (Gmsh: -3), or import the surface as STL, OBJ or "
           "PLY");
+    out_.left_out = std::move(raw_.left_out);
     for (auto step : {&Builder::scale, &Builder::drop_unused, &Builder::centre, &Builder::weld,
                       &Builder::check_nodes_of_tets, &Builder::drop_repeated_tets, &Builder::orient,
                       &Builder::check_overlaps, &Builder::count_pieces})
@@ -136,8 +137,16 @@ class Builder {
       return a.nodes != b.nodes ? a.nodes < b.nodes : a.tet < b.tet;
     });
     std::vector<std::uint8_t> repeated(raw_.tets.size(), 0);
-    for (std::size_t i = 1; i < keys.size(); ++i)
-      if (keys[i].nodes == keys[i - 1].nodes) repeated[keys[i].tet] = 1;
+    std::size_t others = 0;  // in another region than that which is kept
+    for (std::size_t i = 1, first = 0; i < keys.size(); ++i) {
+      if (keys[i].nodes != keys[i - 1].nodes) {
+        first = i;
+        continue;
+      }
+      repeated[keys[i].tet] = 1;
+      others += !raw_.tet_regions.empty() &&
+                raw_.tet_regions[keys[i].tet] != raw_.tet_regions[keys[first].tet];
+    }
     std::size_t kept = 0;
     for (std::size_t t = 0; t < raw_.tets.size(); ++t) {
       if (repeated[t]) continue;
@@ -146,7 +155,8 @@ class Builder {
       raw_.element_ids[kept++] = raw_.element_ids[t];
     }
     if (kept < raw_.tets.size())
-      warn("dropped " + std::to_string(raw_.tets.size() - kept) + " tets that were listed twice");
+      warn("dropped " + std::to_string(raw_.tets.size() - kept) + " tets that were listed twice" +
+           (others == 0 ? "" : ", " + std::to_string(others) + " of them in another region"));
     raw_.tets.resize(kept);
     raw_.element_ids.resize(kept);
     if (!raw_.tet_regions.empty()) raw_.tet_regions.resize(kept);
@@ -238,8 +248,9 @@ class Builder {
     };
     std::map<std::int64_t, NamedNodes> regions;
     for (std::size_t t = 0; t < raw_.tet_regions.size(); ++t) {
-      auto& nodes = regions[raw_.tet_regions[t]].nodes;
-      nodes.insert(nodes.end(), raw_.tets[t].begin(), raw_.tets[t].end());
+      auto& region = regions[raw_.tet_regions[t]];
+      region.nodes.insert(region.nodes.end(), raw_.tets[t].begin(), raw_.tets[t].end());
+      region.tets.emplace_back(t);
     }
     if (regions.size() > 1)
       for (auto& [number, region] : regions) {
@@ -262,6 +273,44 @@ class Builder {
 };
 
 }  // namespace
+
+std::string list_of(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "'" : ", '") + name + "'";
+  }
+  return text;
+}
+
+void RegionSets::add(const std::string& name, const std::vector<std::size_t>& tets) {
+  sets_.push_back({name, tets.size(), 0});
+  if (tets.size() == region_of_.size()) return;
+  for (const auto t : tets) region_of_[t] = static_cast<std::int64_t>(sets_.size());
+}
+
+void RegionSets::finish(RawTets& raw) && {
+  for (const auto region : region_of_)
+    if (region > 0) ++sets_[static_cast<std::size_t>(region - 1)].kept;
+  std::vector<std::string> whole, cut;
+  for (std::size_t s = 0; s < sets_.size(); ++s) {
+    const auto& [name, tets, kept] = sets_[s];
+    if (kept > 0) raw.region_names[static_cast<std::int64_t>(s + 1)] = name;
+    if (tets == region_of_.size())
+      whole.push_back(name);
+    else if (kept < tets)
+      cut.push_back(name + ": " + std::to_string(kept) + " of " + std::to_string(tets));
+  }
+  if (!whole.empty())
+    raw.left_out.push_back("no region, as it holds all elements: " + list_of(whole));
+  if (!cut.empty())
+    raw.left_out.push_back(
+        "an element belongs to the last region that holds it, so these keep fewer: " +
+        list_of(cut));
+  if (raw.region_names.empty()) return;
+  raw.region_names[0] = "rest";
+  raw.tet_regions = std::move(region_of_);
+}
 
 Result<Unit> parse_unit(std::string_view text) {
   if (text == "m") return Unit::Metre;

@@ -29,6 +29,7 @@ double metres_of(Unit unit);
 struct NamedNodes {
   std::string name;
   std::vector<NodeIndex> nodes;  // ascending, distinct
+  std::vector<TetIndex> tets;    // likewise, of a region
 };
 
 struct RawTets {
@@ -40,17 +41,43 @@ struct RawTets {
   std::vector<std::int64_t> tet_regions;
   std::map<std::int64_t, std::string> region_names;  // of some of them
   std::vector<NamedNodes> node_sets;                 // in any order and number
+  std::vector<std::string> left_out;                 // one line each: what of the file is not here
+};
+
+// Regions from sets of tets in the file's order, of which a tet may be in several: it belongs to
+// the last. A set of all tets is a name of the whole, and no region. What differs from the file is
+// left_out.
+class RegionSets {
+ public:
+  explicit RegionSets(std::size_t tets) : region_of_(tets, 0) {}
+
+  // tets: distinct.
+  void add(const std::string& name, const std::vector<std::size_t>& tets);
+  // Gives `raw` its regions; tets of no set are the region "rest".
+  void finish(RawTets& raw) &&;
+
+ private:
+  struct Set {
+    std::string name;
+    std::size_t tets, kept;
+  };
+  std::vector<std::int64_t> region_of_;  // 1 for the first set
+  std::vector<Set> sets_;
 };
 
 struct ImportedMesh {
   TetMesh mesh;    // adjacency built, valid, rest bounding box centred on the origin
   Vec3d offset_m;  // add to a rest position to get the file's place
   std::vector<std::string> warnings;  // one line each: what was repaired, and how often
-  // Each region by name with the nodes of its tets, if the file has two regions or more; those at
-  // an interface belong to both.
+  // Each region by name with its tets and their nodes, if the file has two regions or more; those
+  // at an interface belong to both.
   std::vector<NamedNodes> regions;
   std::vector<NamedNodes> node_sets;  // that have nodes left
+  std::vector<std::string> left_out;  // one line each: what of the file is not here
 };
+
+// The names in quotation marks with commas between them; from some 200 bytes on dots follow.
+std::string list_of(const std::vector<std::string>& names);
 
 // `name` starts each error, usually the file's path.
 Result<ImportedMesh> make_mesh(RawTets raw, Unit unit, const std::string& name);

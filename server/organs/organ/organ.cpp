@@ -85,6 +85,16 @@ Status check_regions(const Organ& organ) {
         return broken(organ, "nodes of region '" + region.name +
                                  "' are not ascending nodes of the mesh at entry " +
                                  std::to_string(i));
+    for (std::size_t i = 0; i < region.tets.size(); ++i) {
+      const auto tet = region.tets[i].value;
+      if (tet >= organ.mesh.tets.size() || (i > 0 && !(region.tets[i - 1] < region.tets[i])) ||
+          !std::ranges::all_of(organ.mesh.tets[tet], [&](NodeIndex node) {
+            return std::ranges::binary_search(region.nodes, node);
+          }))
+        return broken(organ, "tets of region '" + region.name +
+                                 "' are not ascending tets of its nodes at entry " +
+                                 std::to_string(i));
+    }
     if (auto s = check_material(organ, region.material); !s) return s;
   }
   return {};
@@ -291,7 +301,8 @@ MaterialMap material_map(const Organ& organ) {
         if (std::ranges::all_of(elements[i], [&](NodeIndex n) { return is_inside[n.value] != 0; }))
           out[i] = index;
     };
-    mark(organ.mesh.tets, map.tets);
+    if (organ.regions[r].tets.empty()) mark(organ.mesh.tets, map.tets);
+    for (const auto tet : organ.regions[r].tets) map.tets[tet.value] = index;
     mark(organ.mesh.spring_pairs(), map.spring_pairs);
   }
   return map;
@@ -338,6 +349,7 @@ std::uint64_t organ_hash(const Organ& organ) {
   for (const auto& region : organ.regions) {
     hash_array(hasher, numbers_of(region.material));
     hash_array(hasher, region.nodes);
+    if (!region.tets.empty()) hash_array(hasher, region.tets);
   }
   hash_array(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
   hash_array(hasher, organ.stress_free_positions_m);

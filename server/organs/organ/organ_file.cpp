@@ -10,8 +10,9 @@
 namespace trocar::organ {
 namespace {
 
-// An organ with directions of fibres is of a version that programs which would ignore them refuse.
-constexpr std::uint32_t kOrganVersion = 3, kVersionWithoutFibres = 2;
+// An organ with directions of fibres, or with regions that say their tets, is of a version that
+// programs which would ignore them refuse.
+constexpr std::uint32_t kOrganVersion = 4, kVersionWithoutTets = 3, kVersionWithoutFibres = 2;
 constexpr PackedKind kOrganKind{"TROCARO1",
                                 "an .organ file",
                                 "make one with trocar-organ import",
@@ -20,7 +21,10 @@ constexpr PackedKind kOrganKind{"TROCARO1",
                                 kOrganVersion};
 
 std::uint32_t version_of(const Organ& organ) {
-  return organ.fibre_directions.empty() ? kVersionWithoutFibres : kOrganVersion;
+  const auto says_tets = [](const auto& region) { return !region.tets.empty(); };
+  return std::ranges::any_of(organ.regions, says_tets) ? kOrganVersion
+         : organ.fibre_directions.empty()              ? kVersionWithoutFibres
+                                                       : kVersionWithoutTets;
 }
 
 template <typename Field, std::size_t kNodes>
@@ -214,6 +218,7 @@ Bytes encode_organ(const Organ& organ) {
     entry.set_name(region.name);
     put_material(region.material, *entry.mutable_material());
     for (const NodeIndex node : region.nodes) entry.add_node(node.value);
+    for (const TetIndex tet : region.tets) entry.add_tet(tet.value);
   }
   if (length(organ.gravity_m_s2) > 0)
     put_vector(organ.gravity_m_s2, message.mutable_gravity_m_s2());
@@ -253,6 +258,7 @@ Result<Organ> decode_within(BytesView bytes, std::size_t file_bytes) {
     region.name = entry.name();
     if (auto s = take_material(entry.material(), region.material); !s) return s.error();
     for (const std::uint32_t node : entry.node()) region.nodes.emplace_back(node);
+    for (const std::uint32_t tet : entry.tet()) region.tets.emplace_back(tet);
   }
   if (message.gravity_m_s2_size() != 0 && message.gravity_m_s2_size() != 3)
     return bad("organ: gravity must be three numbers");

@@ -45,6 +45,7 @@ std::uint64_t elasticity_hash(const Organ& organ) {
   for (const auto& region : organ.regions) {
     add(hasher, elasticity_of(region.material));
     add(hasher, region.nodes);
+    if (!region.tets.empty()) add(hasher, region.tets);
   }
   add(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
   add(hasher, organ.stress_free_positions_m);

@@ -10,7 +10,8 @@
 // surfaces of one side, ones that pass through themselves, several bodies, and solids larger than 2
 // m. All in double precision; the result is centred on the origin before anything is measured.
 //
-// Shells inside others bound cavities: those at odd depth face inward.
+// Shells inside others bound cavities: those at odd depth face inward. Where the file has one that
+// faces as the shell around it does, a warning says so: it may have been meant as a solid.
 
 #include <string>
 #include <vector>

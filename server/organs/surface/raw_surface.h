@@ -35,6 +35,7 @@ struct RawSurface {
   std::optional<double> unit_m;  // likewise; nothing: it does not say it
   // One line with file and line: the file says it wrongly, and corner_texture is empty.
   std::string texture_fault;
+  std::vector<std::string> left_out;  // one line each: what of the file is not here
 };
 
 }  // namespace trocar::surface

@@ -16,10 +16,12 @@ void replace_node(topology::Topology& topology, TetIndex place, NodeIndex old, N
   auto tet = topology.tet(place);
   const auto wound = topology.wound_faces(place);
   const auto axis = topology.fibre_axis(place);
+  const auto material = topology.material_of(place);
   tet[corner_of(tet, old)] = node;
   topology.remove_tet(place);
   topology.put_tet(place, tet);
   topology.set_fibre_axis(place, axis);
+  topology.set_material(place, material);
   topology.mark_wound_faces(place, wound);
 }
 
@@ -178,6 +180,7 @@ NodeIndex split_edge(topology::Topology& topology, Places& places, NodeIndex a, 
     const auto place = places.occupy_tet(topology);
     topology.put_tet(place, child);
     topology.set_fibre_axis(place, topology.fibre_axis(parent));
+    topology.set_material(place, topology.material_of(parent));
     topology.add_part(place, parent);
     topology.mark_wound_faces(place, wound);
     clear_wound(topology, place, corner_b);

@@ -71,6 +71,9 @@ class Topology {
   void set_fibre_axis(NodeIndex node, const Vec3d& axis);
   void set_fibre_axis(TetIndex tet, const Vec3d& axis);
 
+  // After put_tet(), likewise.
+  void set_material(TetIndex tet, std::uint16_t material) { tet_materials_[tet.value] = material; }
+
   // A node at a place without one. Nothing meets at it yet.
   void put_node(NodeIndex place, const Vec3d& rest, const Vec3d& stress_free,
                 std::span<const std::uint16_t> regions);
