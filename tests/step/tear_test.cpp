@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "server/tissue/cutting/tearing.h"
 #include "server/tissue/cutting/validate.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/support/shared.h"
 
 namespace trocar::step {
 namespace {
@@ -54,6 +56,51 @@ TEST(Tears, AFlapPulledFarEnoughTearsOff) {
     EXPECT_GT(torn, 1e-5) << static_cast<int>(law);
     EXPECT_GT(cutting::find_pieces(state.cuts.topology()).count, 1u) << static_cast<int>(law);
     EXPECT_FALSE(state.grasps[tool_slot({0}, 0)].nodes.empty()) << "the hand still holds its part";
+  }
+}
+
+// A thin wall whose strain is averaged, drawn at 0.2 m/s until it tears, held for a second and let
+// go.
+TEST(Tears, AWallComesToRestWhileItIsHeldAndIsWholeWhenItIsLetGo) {
+  TROCAR_SKIP_WITHOUT_SHARED("cases/tissue/wall.organ");
+  constexpr float kSpeed_m_s = 0.2f;
+  Simulation simulation(*catalogue::load_organ(
+      (trocar::testing::shared_folder() / "cases/tissue/wall.organ").string()));
+  Vec3f top{0, 0, -1};
+  for (const auto& p : simulation.organ().mesh.rest_positions)
+    if (static_cast<float>(p.z) > top.z) top = to_float(p);
+  double torn = 0;
+  for (Tick tick = 1; tick <= 2600; ++tick) {
+    hands::TickInputs inputs;
+    if (tick == 1) {
+      hands::HandJoin join{.slot = {0}};
+      join.shapes[0] = {.radius_m = 0.005f, .length_m = 0.3f, .reach_m = 0.012f, .grip_n = 8};
+      inputs.joins.push_back(join);
+    }
+    const float t = std::clamp(static_cast<float>(tick) * 1e-3f - 0.22f, 0.0f, 0.5f);
+    if (tick % 4 == 1)
+      inputs.samples.push_back({tool_slot({0}, 0),
+                                {{top + Vec3f{0, 0, kSpeed_m_s * t}, rotation_from_z({0, 0, 1})},
+                                 tick < 1720 ? tool::Verb::Grasp : tool::Verb::None}});
+    torn += simulation.tick(inputs, {}).cut.torn_area_m2;
+    float fastest = 0;
+    for (const auto& v : simulation.state().world.velocities)
+      fastest = std::max(fastest, length(v));
+    EXPECT_TRUE(tick != 1700 || fastest < 0.01f) << "held: " << fastest;
+  }
+  EXPECT_GT(torn, 0);
+  for (const auto& u : simulation.state().world.displacements)
+    ASSERT_LT(length(u), 0.2f) << "it flew away";
+  const auto& state = simulation.state();
+  const auto& topology = state.cuts.topology();
+  const auto place = [&](NodeIndex n) {
+    return topology.rest()[n.value] + to_double(state.world.displacements[n.value]);
+  };
+  for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
+    if (!topology.has_tet(TetIndex{t})) continue;
+    const auto& [a, b, c, d] = topology.tet(TetIndex{t});
+    const Vec3d origin = place(a);
+    ASSERT_GT(dot(cross(place(b) - origin, place(c) - origin), place(d) - origin), 0) << t;
   }
 }
 

@@ -36,15 +36,18 @@ Hyperelastic<Law>::Hyperelastic(const topology::Topology& topology, const Groups
   const auto bound = [&](NodeIndex node) { return topology.tets_of(node).size(); };
   rows_.reserve(groups, bound);
   if constexpr (!Law::kIsLinear) invariant_rows_.reserve(groups, bound);
+  if (nodal_strain_ != nullptr) guard_rows_.reserve(groups, bound);
   extend(groups);
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
   rows_.end_building();
   invariant_rows_.end_building();
+  guard_rows_.end_building();
 }
 
 template <typename Law>
 void Hyperelastic<Law>::extend(const Groups& groups) {
   rows_.extend(groups);
+  if (nodal_strain_ != nullptr) guard_rows_.extend(groups);
   if constexpr (Law::kIsLinear) {
     constant_gradient_.resize(groups.group_count());
     constant_block_.resize(groups.group_count());
@@ -61,6 +64,7 @@ std::size_t Hyperelastic<Law>::rebuild(const topology::Topology& topology, const
   for (const auto group_lanes : lanes) written += fill(topology, groups, group_lanes);
   rows_.tidy();
   invariant_rows_.tidy();
+  guard_rows_.tidy();
   return written;
 }
 
@@ -75,7 +79,7 @@ void Hyperelastic<Law>::find_tets(const topology::Topology& topology, NodeIndex 
     const auto tet = seen_from(topology.tet(t), node);
     const auto left =
         nodal_strain_ == nullptr ? NodalStrain::Left{} : nodal_strain_->left_to(topology, t);
-    out.push_back({tet, c10 * left.bracket, bulk * left.volumetric,
+    out.push_back({tet, c10 * left.bracket, bulk * left.volumetric, bulk * (1 - left.volumetric),
                    topology::stress_free_shape(topology, t, tet)});
   }
 }
@@ -95,6 +99,7 @@ std::size_t Hyperelastic<Law>::fill(const topology::Topology& topology, const Gr
   }
   rows_.reshape(lanes, counts);
   if constexpr (!Law::kIsLinear) invariant_rows_.reshape(lanes, counts);
+  if (nodal_strain_ != nullptr) guard_rows_.reshape(lanes, counts);
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     if (lanes.has(lane)) fill_lane(topology, groups, tets_[lane], lanes.group, lane);
   return written;
@@ -108,7 +113,7 @@ void Hyperelastic<Law>::fill_lane(const topology::Topology& topology, const Grou
   Vec3d constant_gradient;
   double constant_block = 0;
   for (std::size_t i = 0; i < tets.size(); ++i) {
-    const auto& [tet, c10, bulk, shape] = tets[i];
+    const auto& [tet, c10, bulk, averaged_bulk, shape] = tets[i];
     const auto& g = shape.gradients;
     const double scale = 2 * c10 * shape.volume;
     std::array<double, 4> w{};
@@ -129,6 +134,11 @@ void Hyperelastic<Law>::fill_lane(const topology::Topology& topology, const Grou
     row.bd.set(lane, to_float(rest[tet[3].value] - rest[tet[1].value]));
     row.volumetric.v[lane] = static_cast<float>(bulk / (36 * shape.volume));
     row.pressure.v[lane] = static_cast<float>(c10 / 3 + bulk / 6);
+    if (nodal_strain_ != nullptr) {
+      GuardRow& guard = guard_rows_[group][i];
+      guard.stiffness.v[lane] = static_cast<float>(averaged_bulk / (36 * shape.volume));
+      guard.least_volume.v[lane] = static_cast<float>(6 * kLeastVolume * shape.volume);
+    }
     if constexpr (!Law::kIsLinear) {
       InvariantRow& extra = invariant_rows_[group][i];
       extra.wbc.v[lane] = static_cast<float>(scale * dot(g[1], g[2]));
@@ -158,9 +168,25 @@ typename Hyperelastic<Law>::RowShape Hyperelastic<Law>::shape(const Row& row, co
   return s;
 }
 
+// Pressure: a sixth of K (J - 1) - 2 C10; V = area . (a - b) / 6.
+template <typename Law>
+typename Hyperelastic<Law>::Volumetric Hyperelastic<Law>::volumetric(const Row& row,
+                                                                     const GuardRow* guard,
+                                                                     const RowShape& shape) {
+  const Float8 stiffness = load(row.volumetric), minus_six_volumes = dot8(shape.area, shape.rb);
+  const Float8 pressure = fnma8(stiffness, minus_six_volumes, all(0) - load(row.pressure));
+  if (guard == nullptr) return {stiffness, pressure};
+  const Float8 lacks = load(guard->least_volume) + minus_six_volumes;
+  const Float8 is_folded = _mm256_cmp_ps(lacks, all(0), _CMP_GT_OQ);
+  if (_mm256_movemask_ps(is_folded) == 0) return {stiffness, pressure};
+  const Float8 guarding = where(is_folded, load(guard->stiffness));
+  return {stiffness + guarding, fnma8(guarding, lacks, pressure)};
+}
+
 template <typename Law>
 void Hyperelastic<Law>::pack(const PackedLanes& pack) {
   rows_.pack(pack);
+  if (nodal_strain_ != nullptr) guard_rows_.pack(pack);
   if constexpr (Law::kIsLinear) {
     constant_gradient_.pack(pack);
     constant_block_.pack(pack);
@@ -174,6 +200,8 @@ void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeS
   const auto rows = rows_[group];
   [[maybe_unused]] std::span<const InvariantRow> invariant_rows;
   if constexpr (!Law::kIsLinear) invariant_rows = invariant_rows_[group];
+  std::span<const GuardRow> guards;
+  if (nodal_strain_ != nullptr) guards = guard_rows_[group];
   // Sums live in registers: in `step` they would be stored and loaded again row after row.
   Vec8 gradient = step.gradient;
   SymMat8 block = step.block;
@@ -202,10 +230,8 @@ void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeS
       // C10 V Psi''/C10 dI1 dI1^T with dI1 = half_di1 / (C10 V)
       block.add_outer(half_di1, second * (inverse + inverse));
     }
-    const Float8 volumetric = load(row.volumetric);
-    block.add_outer(s.area, volumetric);
-    // A sixth of K (J - 1) - 2 C10; V = area . (a - b) / 6
-    const Float8 pressure = fnma8(volumetric, dot8(s.area, s.rb), all(0) - load(row.pressure));
+    const auto [stiffness, pressure] = volumetric(row, guards.empty() ? nullptr : &guards[i], s);
+    block.add_outer(s.area, stiffness);
     gradient = fma8(s.area, pressure, gradient);
   }
   if constexpr (Law::kIsLinear) {
@@ -221,15 +247,16 @@ void Hyperelastic<Law>::linearise(Group group, const Float4* x, const Vec8& own,
                                   StiffnessSink& sink) const {
   add(group, x, own, step);
   const auto rows = rows_[group];
+  std::span<const GuardRow> guards;
+  if (nodal_strain_ != nullptr) guards = guard_rows_[group];
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
     const RowShape s = shape(row, x, own);
-    const Float8 volumetric = load(row.volumetric);
-    const Float8 pressure = fnma8(volumetric, dot8(s.area, s.rb), all(0) - load(row.pressure));
+    const auto [stiffness, pressure] = volumetric(row, guards.empty() ? nullptr : &guards[i], s);
     // Six times the derivatives of the volume.
     const Vec8 of_c = cross8(s.ed, s.rb), of_d = cross8(s.rb, s.ec);
     const Vec8 of_b = zero_vec8() - (s.area + of_c + of_d);
-    const Vec8 stiff_area = s.area * volumetric;
+    const Vec8 stiff_area = s.area * stiffness;
     Mat8 b = zero_mat8(), c = b, d = b;
     b.add_outer(stiff_area, of_b), b.add_cross((s.ec - s.ed) * pressure);
     c.add_outer(stiff_area, of_c), c.add_cross(s.ed * pressure);
@@ -258,8 +285,9 @@ void Hyperelastic<Law>::linearise(Group group, const Float4* x, const Vec8& own,
 }
 
 template <typename Law>
-double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, std::size_t lane,
-                                     Slot own, std::span<const Vec3d> u) const {
+double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra,
+                                     const GuardRow* guard, std::size_t lane, Slot own,
+                                     std::span<const Vec3d> u) const {
   const auto at = [&](const Lanes& l) { return static_cast<double>(l.v[lane]); };
   const Vec3d ub = u[row.b.v[lane]], uc = u[row.c.v[lane]], ud = u[row.d.v[lane]];
   const Vec3d ab0 = to_double(row.ab.at(lane)), bc0 = to_double(row.bc.at(lane)),
@@ -286,6 +314,10 @@ double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, 
   // 6 V_now = s: d/ds of the sum is (v s - p) / 6.
   energy -= 0.25 * at(row.pressure) * six_volumes;
   energy += 0.25 * 0.5 * at(row.volumetric) * six_volumes * six_volumes;
+  if (guard != nullptr) {
+    const double lacks = std::max(0.0, at(guard->least_volume) - six_volumes);
+    energy += 0.25 * 0.5 * at(guard->stiffness) * lacks * lacks;
+  }
   return energy;
 }
 
@@ -301,7 +333,8 @@ void Hyperelastic<Law>::add_energies_j(std::span<const Vec3d> displacements,
         if (row.b.v[lane] == own) break;  // padding
         const InvariantRow* extra = nullptr;
         if constexpr (!Law::kIsLinear) extra = &invariant_rows_[g][i];
-        energy += row_energy(row, extra, lane, own, displacements);
+        const GuardRow* guard = nodal_strain_ == nullptr ? nullptr : &guard_rows_[g][i];
+        energy += row_energy(row, extra, guard, lane, own, displacements);
       }
       energies[own] += energy;
     }

@@ -7,7 +7,10 @@
 // is exact and positive definite and an inverted tet is no special case. Both brackets are free of
 // stress at rest.
 //
-// Where strain is averaged (nodal_hyperelastic.h), tets have what is left to them.
+// Where strain is averaged (nodal_hyperelastic.h), tets have what is left to them. The mean volume
+// of a node's tets may be right while one of them is inside out and the others too large; so a tet
+// with less than kLeastVolume of its volume also has what was taken from it,
+//   K/2 (J - kLeastVolume)^2,   J < kLeastVolume.
 
 #include "server/tissue/dynamics/energy.h"
 #include "server/tissue/dynamics/nodal_strain.h"
@@ -51,17 +54,32 @@ class Hyperelastic final : public Energy {
 
     void pad(std::size_t, Slot) {}
   };
+  // Only rows of averaged strain have these; a tet that has all of its own volumetric term has
+  // zeros.
+  struct GuardRow {
+    Lanes stiffness;     // K / (36 V), Pa/m^3, of what is averaged
+    Lanes least_volume;  // 6 kLeastVolume V, m^3
+
+    void pad(std::size_t, Slot) {}
+  };
+  static constexpr double kLeastVolume = 0.2;
   struct RowShape;
+  // Of a row: its stiffness against its volume, Pa/m^3, and what presses on it, Pa.
+  struct Volumetric {
+    Float8 stiffness, pressure;
+  };
+  static Volumetric volumetric(const Row& row, const GuardRow* guard, const RowShape& shape);
   // Inlined whatever the compiler thinks: its result would go through memory, at twice the time.
   [[gnu::always_inline]] static inline RowShape shape(const Row& row, const Float4* x,
                                                       const Vec8& own);
-  double row_energy(const Row& row, const InvariantRow* extra, std::size_t lane, Slot own,
-                    std::span<const Vec3d> u) const;
+  double row_energy(const Row& row, const InvariantRow* extra, const GuardRow* guard,
+                    std::size_t lane, Slot own, std::span<const Vec3d> u) const;
 
   // This is a tet as seen from one of its nodes.
   struct At {
     mesh::Tet tet;
     double c10 = 0, bulk = 0;  // left to it, Pa
+    double averaged_bulk = 0;  // Pa
     topology::TetShape shape;  // free of stress, of `tet`
   };
   void find_tets(const topology::Topology& topology, NodeIndex node, std::vector<At>& out) const;
@@ -75,6 +93,7 @@ class Hyperelastic final : public Energy {
   const HyperelasticParameters parameters_;
   GroupRows<Row> rows_;
   GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law
+  GroupRows<GuardRow> guard_rows_;            // empty without averaged strain
   GroupValues<Vec3Lanes> constant_gradient_;  // N per group; linear laws
   GroupValues<Lanes> constant_block_;         // N/m per group; linear laws
   // While rows are filled.

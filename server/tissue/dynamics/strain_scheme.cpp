@@ -11,10 +11,16 @@ namespace {
 // by 0.8 % of the solved ones where 5 % are added, and by 4 % where 25 % are.
 constexpr double kMostAdded = 0.12;
 
+bool can_tear(const organ::Organ& organ) {
+  for (std::size_t m = 0; m <= organ.regions.size(); ++m)
+    if (organ::material_at(organ, static_cast<std::uint16_t>(m)).tear_stretch > 0) return true;
+  return false;
+}
+
 }  // namespace
 
 StrainScheme scheme_for(const organ::Organ& organ, const world::World& world, float dt) {
-  if (!NodalStrain::are_needed(organ)) return StrainScheme::Implicit;
+  if (!NodalStrain::are_needed(organ) || can_tear(organ)) return StrainScheme::Implicit;
   Tissue tissue(organ, StrainScheme::Explicit);
   const auto& groups = tissue.groups();
   const std::vector<Float4> rest(groups.slot_count());

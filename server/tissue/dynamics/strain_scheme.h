@@ -11,7 +11,9 @@
 // Light nodes get as much inertia in addition as that takes, against what would change their
 // velocity. A session's step of 1 ms needs little of it in soft tissue of elements of some
 // millimetres, and then forces are as true as if solved for. Of stiffer or finer tissue it would
-// make another body: scheme_for() says when.
+// make another body: scheme_for() says when. Where tissue tears, strands are stretched and folded
+// until their forces are no longer what that bound was found for, and nothing stops what then
+// swings: such organs are solved implicitly.
 
 #include <cstdint>
 
@@ -30,8 +32,8 @@ inline constexpr float kMostStiffness = 6;
 // moves them by omega times Newton's step, omega times as much.
 inline constexpr float kLeastInertia = kMostStiffness / 4;
 
-// Returns the scheme for ticks of a session with steps of dt, s: Explicit unless it would add more
-// than 12 % to the inertia of what moves. O(organ).
+// Returns the scheme for ticks of a session with steps of dt, s: Explicit unless tissue can tear,
+// or it would add more than 12 % to the inertia of what moves. O(organ).
 StrainScheme scheme_for(const organ::Organ& organ, const world::World& world, float dt);
 
 }  // namespace trocar::dynamics
