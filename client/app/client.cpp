@@ -19,6 +19,7 @@
 #include "client/replica/client_messages.h"
 #include "common/base/kept_file.h"
 #include "common/base/log.h"
+#include "common/base/signals.h"
 #include "common/base/timing.h"
 #include "common/secure/link_file.h"
 #include "common/secure/loopback.h"
@@ -55,6 +56,7 @@ class Run {
  private:
   Status step(std::uint64_t now_ns);
   Status poll();
+  void note_recording();
   void measure(std::uint64_t now_ns);
   void use_marks();
   bool is_over(std::uint64_t now_ns);
@@ -78,6 +80,7 @@ class Run {
   bool has_answered_ = false;
   std::string exit_reason_;
   replica::TimeDistribution round_trip_, surface_age_, hand_to_visible_, cut_to_visible_;
+  wire::RecordingStatus recording_told_ = wire::RecordingStatus::Unknown;
   std::uint64_t last_change_us_ = 0;
   double last_round_trip_seconds_ = 0;
 };
@@ -104,6 +107,7 @@ Status Run::step(std::uint64_t now_ns) {
     log::info("in the session: {}, {} surface vertices", replica_.topology().organ_name,
               replica_.topology().rest_positions.size());
   }
+  note_recording();
   if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
   use_marks();
   measure(now_ns);
@@ -114,6 +118,14 @@ Status Run::step(std::uint64_t now_ns) {
     if (const auto taken = take_screenshot(now_ns, false); !taken) return taken.error();
   }
   return {};
+}
+
+// A person without a picture, or who looks elsewhere, hears it too.
+void Run::note_recording() {
+  const auto& recording = replica_.recording();
+  if (recording.is_damaged() && recording.status != recording_told_)
+    log::warn("{}", recording.text);
+  recording_told_ = recording.status;
 }
 
 // The first second, in which clocks and paths are found, does not count.
@@ -307,11 +319,11 @@ Status set_security(const ClientOptions& options, net::NetSourceOptions& connect
 }  // namespace
 
 void install_signal_handlers() {
-  const auto stop = [](int) { stop_requested = 1; };
-  std::signal(SIGINT, stop);
-  std::signal(SIGTERM, stop);
-  // A terminal that is closed, unless it was told to be of no account (nohup).
-  if (std::signal(SIGHUP, stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+  for (const int signal : ending_signals())
+    std::signal(signal, [](int) {
+      stop_requested = 1;
+      ignore_ending_signals();
+    });
 }
 
 Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,

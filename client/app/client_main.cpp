@@ -5,8 +5,8 @@
 #include "client/app/client.h"
 #include "client/device/crash.h"
 #include "client/device/device_list.h"
-#include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/discovery/finder.h"
 
 namespace {
@@ -24,7 +24,7 @@ int list_sessions(double seconds) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(kProgram);
+  trocar::begin_program(kProgram);
   const auto options = trocar::app::parse_client_command_line(argc, argv);
   if (!options) return trocar::report(kProgram, options.error());
   if (!*options) return static_cast<int>(trocar::ExitCode::Ok);

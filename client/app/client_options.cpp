@@ -130,7 +130,7 @@ Status check_tools(const ClientOptions& options) {
 // Checks what belongs to devices, without opening them.
 Error lacks_tools(const std::string& option, replica::Role role) {
   const bool may = wire::rights_of(role).may_have_tools;
-  return {ErrorCode::Usage, option + ": an " + replica::name_of(role) + " has no tools; " +
+  return {ErrorCode::Usage, option + ": " + wire::one_of(role) + " has no tools; " +
                                 (may ? "add --with-tools" : "use --role surgeon or assistant")};
 }
 

@@ -8,9 +8,9 @@
 #include "client/doctor/advice.h"
 #include "client/doctor/machine.h"
 #include "client/doctor/visitor.h"
-#include "common/base/cpu.h"
 #include "common/base/log.h"
 #include "common/base/number_option.h"
+#include "common/base/program.h"
 #include "common/base/stdout_check.h"
 #include "common/base/version.h"
 #include "common/discovery/finder.h"
@@ -134,6 +134,6 @@ int run(int argc, char** argv) {
 }  // namespace trocar::doctor
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(trocar::doctor::kProgram);
+  trocar::begin_program(trocar::doctor::kProgram);
   return trocar::finish_output(trocar::doctor::kProgram, trocar::doctor::run(argc, argv));
 }

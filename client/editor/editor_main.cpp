@@ -7,8 +7,8 @@
 #include <string>
 
 #include "client/editor/editor_window.h"
-#include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "server/app/edit_command/edit_command.h"
@@ -81,6 +81,6 @@ int run(int argc, char** argv) {
 }  // namespace trocar::editor
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features("trocar-organ");
+  trocar::begin_program("trocar-organ");
   return trocar::editor::run(argc, argv);
 }

@@ -19,9 +19,9 @@ std::map<std::uint16_t, std::uint16_t> add_channels(const McapReader& reader, Mc
 }
 
 Status copy(McapReader& reader, McapWriter& writer, const MessageChange& change,
-            const McapMetadata& note, ReadReport& report) {
+            const McapMetadata& note, const MetadataChange& change_metadata, ReadReport& report) {
   for (const auto& metadata : reader.metadata())
-    if (auto written = writer.write_metadata(metadata); !written) return written;
+    if (auto written = writer.write_metadata(change_metadata(metadata)); !written) return written;
   const auto channels = add_channels(reader, writer);
   Status written;
   report =
@@ -42,14 +42,16 @@ Status copy(McapReader& reader, McapWriter& writer, const MessageChange& change,
 }  // namespace
 
 Result<ReadReport> copy_recording(McapReader& reader, const std::string& to,
-                                  const MessageChange& change, const McapMetadata& note) {
+                                  const MessageChange& change, const McapMetadata& note,
+                                  const MetadataChange& change_metadata) {
   if (auto is_free = UnfinishedFile::refuse_existing(to); !is_free) return is_free.error();
   const auto part = UnfinishedFile::name_for(to);
   auto created = McapWriter::create(part, reader.header());
   if (!created) return created.error();
   UnfinishedFile file(part);
   ReadReport report;
-  if (auto copied = copy(reader, **created, change, note, report); !copied) return copied.error();
+  if (auto copied = copy(reader, **created, change, note, change_metadata, report); !copied)
+    return copied.error();
   if (auto named = file.rename_to_new(to); !named) return named.error();
   return report;
 }

@@ -18,11 +18,16 @@ namespace {
 
 constexpr int kZstdLevel = 1;  // higher levels cost time and save next to nothing on our streams
 
+// Recordings hold people's names and words: no business of everybody on the machine.
+constexpr mode_t kMode = 0640;
+
 Error io_error(const std::string& path, const char* action) {
   const int code = errno;
   return {ErrorCode::ResourceMissing, path + ": cannot " + action + ": " +
                                           std::string(std::strerror(code)) +
-                                          (code == ENOSPC ? "; free some space" : "")};
+                                          (code == ENOSPC  ? "; free some space"
+                                           : code == EFBIG ? "; raise the limit of file sizes"
+                                                           : "")};
 }
 
 bool is_device(const std::string& path) {
@@ -46,7 +51,7 @@ Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::string& path,
                                                        const McapHeader& header,
                                                        const McapWriterOptions& options) {
   const int create_flags = is_device(path) ? 0 : O_CREAT | O_EXCL;
-  const int fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | create_flags, 0644);
+  const int fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | create_flags, kMode);
   if (fd < 0 && errno == EEXIST)
     return Error{ErrorCode::BadFile,
                  path + ": exists already; choose another name or move it away"};

@@ -33,9 +33,24 @@ namespace {
 
 constexpr unsigned kFirstTimeoutUs = 250'000, kLongestTimeoutUs = 2'000'000;
 constexpr std::size_t kCookieBytes = 16;
+constexpr std::size_t kRecordHeaderBytes = 13;  // type, version, epoch, number, length
+constexpr std::uint8_t kAlert = 21;
+constexpr std::size_t kSealBytes = 8 + 16;  // explicit nonce and tag
 
 using Core = DatagramChannel::Core;
 using State = DatagramChannel::State;
+
+// OpenSSL ends a connection for a record that is too short to be sealed, and a handshake for an
+// alert in the open. Anybody can send these: a datagram that has one is nobody's.
+bool may_be_of_peer(BytesView datagram) {
+  while (datagram.size() >= kRecordHeaderBytes) {
+    const bool is_sealed = datagram[3] != 0 || datagram[4] != 0;
+    const auto size = static_cast<std::size_t>(datagram[11] << 8 | datagram[12]);
+    if (is_sealed ? size < kSealBytes : datagram[0] == kAlert) return false;
+    datagram = datagram.subspan(std::min(datagram.size(), kRecordHeaderBytes + size));
+  }
+  return true;
+}
 
 Core& core_of(const SSL* ssl) {
   return *static_cast<Core*>(SSL_get_app_data(ssl));
@@ -135,10 +150,9 @@ unsigned next_timer(SSL*, unsigned last_us) {
 SSL_CTX* make_datagram_context() {
   auto* context = SSL_CTX_new(DTLS_method());
   TROCAR_ASSERT(context != nullptr);
-  const bool is_set =
-      SSL_CTX_set_min_proto_version(context, DTLS1_2_VERSION) == 1 &&
-      SSL_CTX_set_max_proto_version(context, DTLS1_2_VERSION) == 1 &&
-      SSL_CTX_set_cipher_list(context, "PSK-AES256-GCM-SHA384:PSK-CHACHA20-POLY1305") == 1;
+  const bool is_set = SSL_CTX_set_min_proto_version(context, DTLS1_2_VERSION) == 1 &&
+                      SSL_CTX_set_max_proto_version(context, DTLS1_2_VERSION) == 1 &&
+                      SSL_CTX_set_cipher_list(context, "PSK-AES256-GCM-SHA384") == 1;
   TROCAR_ASSERT(is_set);
   SSL_CTX_set_options(context, SSL_OP_NO_QUERY_MTU | SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_TICKET |
                                    SSL_OP_COOKIE_EXCHANGE);
@@ -211,6 +225,7 @@ void DatagramChannel::start() {
 }
 
 State DatagramChannel::receive(BytesView datagram, const Deliver& deliver) {
+  if (!may_be_of_peer(datagram)) return core_->state;
   core_->incoming = datagram;
   if (core_->state == State::Shaking) core_->shake();
   core_->drain(deliver);

@@ -47,7 +47,8 @@ class DatagramChannel {
 
   void start();
   // Takes one datagram of the peer and hands on the messages in it. What is forged, replayed or
-  // garbled is dropped.
+  // garbled is dropped, and so are alerts that nobody has sealed: a handshake that the peer gives
+  // up ends by its owner's deadline.
   State receive(BytesView datagram, const Deliver& deliver);
   State state() const;
   // Seals and sends one message of at most kDatagramMessageBytes; false unless Open.

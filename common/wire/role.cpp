@@ -1,5 +1,7 @@
 #include "common/wire/role.h"
 
+#include <string_view>
+
 #include "proto/wire.pb.h"
 
 namespace trocar::wire {
@@ -14,6 +16,11 @@ const char* name_of(Role role) {
   for (const auto& known : kRoles)
     if (known.role == role) return known.name;
   return "unknown role";
+}
+
+std::string one_of(Role role) {
+  const std::string name = name_of(role);
+  return (std::string_view("aeiou").find(name[0]) == std::string_view::npos ? "a " : "an ") + name;
 }
 
 Role role_of(int number) {

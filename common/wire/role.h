@@ -87,6 +87,8 @@ constexpr bool has_tools(Role role) {
 }
 // "unknown role" if it is none of kRoles.
 const char* name_of(Role role);
+// "a surgeon", "an observer".
+std::string one_of(Role role);
 // From the wire; Unknown if it is none of kRoles.
 Role role_of(int number);
 // "surgeon (1), assistant (2), ...": for messages.

@@ -2,10 +2,15 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <cstdio>
+
+#include "common/base/program.h"
 
 namespace trocar {
 namespace {
@@ -28,6 +33,42 @@ TEST(Signals, WritingWhereNobodyReadsIsAnErrorAlone) {
   EXPECT_EQ(errno, EPIPE);
   ::close(ends[1]);
   ::signal(SIGPIPE, before);
+}
+
+// What the child does with the second signal, and with the third after its time is over.
+int exit_of_ended_thrice(unsigned seconds) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ignore_ending_signals(seconds);
+    for (const int number : ending_signals()) ::raise(number);
+    ::raise(SIGTERM);
+    while (::pause() != -1 || errno != EINTR) {
+    }
+    ::raise(SIGTERM);
+    ::_exit(0);
+  }
+  int status = 0;
+  EXPECT_EQ(::waitpid(child, &status, 0), child);
+  return WIFSIGNALED(status) ? WTERMSIG(status) : -1;
+}
+
+TEST(Signals, AnEndInOrderIsNotCutShortUntilItsTimeIsOver) {
+  EXPECT_EQ(exit_of_ended_thrice(1), SIGTERM);
+}
+
+TEST(Signals, AFileThatMayNotGrowIsAnErrorAlone) {
+  const auto before = ::signal(SIGXFSZ, SIG_DFL);
+  begin_program("base_test");
+  std::FILE* file = std::tmpfile();
+  rlimit room{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &room), 0);
+  const rlimit none{0, room.rlim_max};
+  ::setrlimit(RLIMIT_FSIZE, &none);
+  EXPECT_EQ(::write(::fileno(file), "x", 1), -1);
+  EXPECT_EQ(errno, EFBIG);
+  ::setrlimit(RLIMIT_FSIZE, &room);
+  std::fclose(file);
+  ::signal(SIGXFSZ, before);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "common/base/timing.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/session/bleeding/bleeding.h"
@@ -97,7 +97,7 @@ void run(organ::Organ organ, const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace trocar;
-  require_cpu_features(kProgram);
+  begin_program(kProgram);
   Options options;
   CLI::App app{"What bleeding takes, in a tick, in a frame and on the wire.", kProgram};
   app.add_option("--organ", options.organ, "a built-in organ or a file")->capture_default_str();

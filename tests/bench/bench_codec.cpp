@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "common/base/checksum.h"
-#include "common/base/cpu.h"
 #include "common/base/exit_code.h"
+#include "common/base/program.h"
 #include "common/base/timing.h"
 #include "common/journal/session_journal.h"
 #include "common/math/morton.h"
@@ -248,7 +248,7 @@ bool measure_recorded(const std::string& path) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  require_cpu_features("bench_codec");
+  begin_program("bench_codec");
   CLI::App app{
       "Bytes and time of the surface codec on a synthetic stream, beside the design's figures."};
   app.footer(

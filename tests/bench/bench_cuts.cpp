@@ -10,7 +10,7 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "common/math/box.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
@@ -199,7 +199,7 @@ void run(organ::Organ organ, const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace trocar;
-  require_cpu_features(kProgram);
+  begin_program(kProgram);
   Options options;
   CLI::App app{"cost of cutting in a session's tick", kProgram};
   app.add_option("--organ", options.organ, ".organ or .msh file [the built-in liver, 88,000 tets]");

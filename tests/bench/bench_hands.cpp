@@ -16,7 +16,7 @@
 #include <cstdio>
 #include <optional>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "common/base/timing.h"
 #include "server/lab/calibration/press.h"
 #include "server/organs/catalogue/builtin_organs.h"
@@ -409,7 +409,7 @@ Status run(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace trocar;
-  require_cpu_features(kProgram);
+  begin_program(kProgram);
   Options options;
   CLI::App app("Many scripted hands on one organ: what a tick takes, and how true its forces are.",
                kProgram);

@@ -12,8 +12,8 @@
 
 #include "client/replay/replay_source.h"
 #include "client/replica/replica.h"
-#include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/timing.h"
 #include "common/math/box.h"
 #include "server/app/server/simulation_loop.h"
@@ -284,7 +284,7 @@ void play(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace trocar;
-  require_cpu_features(kProgram);
+  begin_program(kProgram);
   Options options;
   CLI::App app{"A long session of cutting: what a tick, a frame and the recording take", kProgram};
   app.add_option("--organ", options.organ, "as trocar-server's")->capture_default_str();

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "common/math/box.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/tissue/step/simulation.h"
@@ -273,7 +273,7 @@ void fall(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace trocar;
-  require_cpu_features(kProgram);
+  begin_program(kProgram);
   Options options;
   CLI::App app{"CPU time of ticks in which cut tissue is at rest", kProgram};
   app.add_option("scenes", options.scenes, "wave, wound, minutes, fall")

@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "common/base/version.h"
 #include "tests/bench/bench_run.h"
 #include "tests/bench/bullet_peer.h"
@@ -78,7 +78,7 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace trocar::bench;
-  trocar::require_cpu_features(kProgram);
+  trocar::begin_program(kProgram);
   Options options;
   bool is_short = false, is_smoke = false;
   CLI::App app("Measures the solver: beside Bullet, against the targets, and how it grows.",

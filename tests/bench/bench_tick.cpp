@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/tissue/step/simulation.h"
 
@@ -109,7 +109,7 @@ int run(const char* title, material::ElasticLaw law, const step::TickDecisions& 
 }  // namespace trocar
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(trocar::kProgram);
+  trocar::begin_program(trocar::kProgram);
   CLI::App app{
       "CPU time of every stage of a tick: the built-in liver with three hands for 6 s, of springs\n"
       "and neo-Hookean, frozen beyond 1,200 nodes and graded. Takes about 10 s.",

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -360,6 +361,16 @@ TEST(mcap, a_signal_leaves_no_half_of_a_file) {
   }
   EXPECT_TRUE(std::filesystem::exists(path));
   EXPECT_FALSE(std::filesystem::exists(part));
+}
+
+TEST(mcap, a_recording_is_no_business_of_everybody) {
+  const TemporaryFolder folder;
+  const auto before = ::umask(0);
+  ASSERT_TRUE(create(folder.file("a.mcap"))->close().ok());
+  ::umask(before);
+  struct stat status {};
+  ASSERT_EQ(::stat(folder.file("a.mcap").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0640u);
 }
 
 TEST(mcap, full_disk_is_an_error_and_stays_one) {

@@ -89,15 +89,13 @@ TEST_F(Figures, NonsenseAndLongHeadsAreNotAnswered) {
   EXPECT_TRUE(get("/healthz").starts_with("HTTP/1.1 200 ")) << "it goes on";
 }
 
-TEST_F(Figures, TooManyAtATimeAreClosedAndMakeRoomAgain) {
+TEST_F(Figures, SocketsThatSayNothingKeepNobodyOut) {
   std::vector<tcp::socket> silent;
-  for (std::size_t i = 0; i < FiguresServer::kMostConnections; ++i) silent.push_back(connect());
-  auto late = connect();
-  EXPECT_EQ(read_all(late), "");
-  silent.clear();
-  std::string answer;
-  while (answer.empty()) answer = get("/healthz");
-  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 ")) << answer;
+  for (int round = 0; round < 10; ++round) {
+    for (std::size_t i = 0; i < FiguresServer::kMostConnections; ++i) silent.push_back(connect());
+    EXPECT_TRUE(get("/healthz").starts_with("HTTP/1.1 200 ")) << round;
+  }
+  EXPECT_EQ(read_all(silent.front()), "") << "the oldest has gone";
 }
 
 TEST(FiguresServer, ABadOrTakenAddressIsAnError) {

@@ -1,6 +1,7 @@
 // The server program's parts: pacing, the simulation loop's frames and records, the command line,
 // and one run of the whole program as a process.
 
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/journal/mcap_reader.h"
 #include "server/app/server/frame_handover.h"
 #include "server/app/server/options.h"
 #include "server/app/server/pacer.h"
@@ -286,18 +288,19 @@ TEST(CommandLine, listen_addresses) {
 
 class ServerProcess : public ::testing::Test {
  protected:
-  // Starts the program and waits for its port.
-  std::uint16_t start(std::vector<std::string> arguments) {
+  // Starts the program and waits for its port. Its files may grow to so many bytes; 0: to any size.
+  std::uint16_t start(std::vector<std::string> arguments, const std::string& journal = "none",
+                      rlim_t file_bytes = 0) {
     folder_ =
         std::filesystem::temp_directory_path() / ("trocar_server_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
+    journal_ = journal == "none" ? journal : (folder_ / journal).string();
     const auto ready = folder_ / "port";
     for (const std::string& more :
          {std::string("--insecure-loopback"), std::string("--listen"), std::string("127.0.0.1:0"),
-          std::string("--journal"), std::string("none"), std::string("--organ"),
-          std::string("lattice"), std::string("--log-level"), std::string("off"),
-          std::string("--ready-file"), ready.string(), std::string("--summary"),
-          (folder_ / "summary.json").string()})
+          std::string("--journal"), journal_, std::string("--organ"), std::string("lattice"),
+          std::string("--log-level"), std::string("off"), std::string("--ready-file"),
+          ready.string(), std::string("--summary"), (folder_ / "summary.json").string()})
       arguments.push_back(more);
     std::vector<char*> argv;
     const std::string program = TROCAR_BINARY_DIR "/trocar-server";
@@ -306,6 +309,8 @@ class ServerProcess : public ::testing::Test {
     argv.push_back(nullptr);
     pid_ = ::fork();
     if (pid_ == 0) {
+      const rlimit limit{file_bytes, file_bytes};
+      if (file_bytes > 0) ::setrlimit(RLIMIT_FSIZE, &limit);
       ::execv(program.c_str(), argv.data());
       ::_exit(127);
     }
@@ -337,6 +342,7 @@ class ServerProcess : public ::testing::Test {
   }
 
   std::filesystem::path folder_;
+  std::string journal_;
   pid_t pid_ = 0;
 };
 
@@ -390,13 +396,47 @@ TEST_F(ServerProcess, sigterm_asks_for_the_crc_says_goodbye_and_exits_with_0) {
   EXPECT_NE(summary().find("\"name\": \"Anna\""), std::string::npos) << summary();
 }
 
+TEST_F(ServerProcess, more_signals_do_not_cut_the_end_of_the_recording_short) {
+  const auto port = start({}, "two.mcap");
+  ASSERT_NE(port, 0);
+  RawClient client(port);
+  ASSERT_TRUE(client.join("Anna", proto::ROLE_SURGEON));
+  for (int i = 0; i < 3; ++i) ::kill(pid_, i == 1 ? SIGINT : SIGTERM);
+  while (client.receive())  // it answers nothing, so the end waits for it
+    ::kill(pid_, SIGTERM);
+  EXPECT_EQ(wait_for_exit(), 0);
+  const auto recorded = journal::McapReader::open(journal_);
+  ASSERT_TRUE(recorded.ok());
+  EXPECT_TRUE((*recorded)->is_finished());
+}
+
+TEST_F(ServerProcess, a_limit_of_file_sizes_ends_the_recording_and_nothing_else) {
+  const auto port = start({}, "limit.mcap", 400'000);
+  ASSERT_NE(port, 0);
+  RawClient client(port);
+  ASSERT_TRUE(client.join("Anna", proto::ROLE_SURGEON));
+  proto::RecordingState state;
+  while (state.status() != proto::RECORDING_FAILED) {
+    const auto message = client.receive(proto::Envelope::kRecordingState);
+    ASSERT_TRUE(message);
+    state = message->recording_state();
+  }
+  EXPECT_NE(state.text().find("File too large"), std::string::npos) << state.text();
+  EXPECT_TRUE(client.follow()) << "the session goes on";
+  ::kill(pid_, SIGTERM);
+  while (client.receive()) {
+  }
+  EXPECT_EQ(wait_for_exit(), 5);
+}
+
 TEST_F(ServerProcess, seconds_end_by_themselves_and_a_taken_port_is_exit_code_5) {
   const auto port = start({"--seconds", "0.5"});
   ASSERT_NE(port, 0);
-  const std::string second = TROCAR_BINARY_DIR
-                             "/trocar-server --insecure-loopback --organ lattice --journal none "
-                             "--listen 127.0.0.1:" +
-                             std::to_string(port) + " 2>/dev/null";
+  const std::string second =
+      TROCAR_BINARY_DIR
+      "/trocar-server --insecure-loopback --organ lattice --journal none --seconds 1 "
+      "--listen 127.0.0.1:" +
+      std::to_string(port) + " 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(second.c_str())), 5);
   EXPECT_EQ(wait_for_exit(), 0);
   EXPECT_NE(summary().find("\"last_tick\": 512"), std::string::npos) << summary();

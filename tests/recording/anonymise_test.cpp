@@ -9,8 +9,11 @@
 #include <csignal>
 #include <filesystem>
 #include <iterator>
+#include <set>
 
 #include "common/journal/session_journal_writer.h"
+#include "server/session/recording/csv_text.h"
+#include "server/session/recording/recorded_texts.h"
 #include "server/session/recording/verify.h"
 #include "tests/recording/recorded_simulation.h"
 #include "tests/support/files.h"
@@ -104,6 +107,77 @@ TEST(anonymise, kept_words_lose_names_alone) {
   ASSERT_TRUE(anonymise(talk(folder.file("a.mcap")), folder.file("b.mcap"), true).ok());
   const std::string text = all_bytes(folder.file("b.mcap"));
   EXPECT_NE(text.find("Person 3: ask Person 1, or Annabel: she knows"), std::string::npos) << text;
+}
+
+// Names of who waited and of marks are in no list.
+TEST(anonymise, sentences_and_metadata_hold_no_name_that_no_list_has) {
+  const TemporaryFolder folder;
+  {
+    auto created = journal::SessionJournalWriter::create(
+        folder.file("a.mcap"), {.start_utc_ns = 1,
+                                .organ_name = "liver",
+                                .continues = journal::Continuation{"Ada and Ben.mcap", 16}});
+    ASSERT_TRUE(created.ok());
+    const auto say = [&](int action, const std::string& text) {
+      proto::LessonRecord record;
+      record.mutable_teach()->set_action(static_cast<proto::TeachAction>(action));
+      record.mutable_teach()->set_text(text);
+      EXPECT_TRUE((*created)->write(journal::JournalTopic::Lesson, 17, 17, record).ok());
+    };
+    proto::Participants people;
+    people.add_participant()->set_name("Ivy: the first");
+    EXPECT_TRUE((*created)->write_participants(17, 17, people).ok());
+    say(proto::TEACH_ADMIT, "Ivy: the first lets Zoë in");
+    say(proto::TEACH_RENAME, "Ivy: the first has renamed Ben to Bea");
+    say(proto::TEACH_CHAT, "Ivy: the first: hello");
+    say(proto::TEACH_NONE, "the instructor has returned the organ to the mark \"Ada's cut\"");
+    say(99, "Cleo does what a newer program can");
+    ASSERT_TRUE((*created)->close().ok());
+  }
+  const auto report = anonymise(folder.file("a.mcap"), folder.file("b.mcap"), false);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->words, 3u);
+  std::string text = all_bytes(folder.file("b.mcap"));
+  for (const char* name : {"Ivy", "first", "Zo", "Ben", "hello", "Ada", "cut", "Cleo"})
+    EXPECT_EQ(text.find(name), std::string::npos) << name;
+  EXPECT_NE(text.find("Person 1 lets Person 2 in"), std::string::npos) << text;
+  const auto file = trocar::testing::load_file(folder.file("b.mcap"));
+  text.assign(file.begin(), file.end());
+  EXPECT_EQ(text.find("Ada"), std::string::npos) << "the part before";
+}
+
+// Calls `visit` with the full name of each text that such a message can hold.
+template <typename Visitor>
+void each_field(const google::protobuf::Descriptor& message, std::set<std::string>& seen,
+                const Visitor& visit) {
+  if (!seen.insert(message.full_name()).second) return;
+  for (int i = 0; i < message.field_count(); ++i) {
+    const auto& field = *message.field(i);
+    if (field.type() == google::protobuf::FieldDescriptor::TYPE_STRING) visit(field.full_name());
+    if (field.message_type() != nullptr) each_field(*field.message_type(), seen, visit);
+  }
+}
+
+TEST(anonymise, each_text_of_the_schema_is_listed) {
+  std::set<std::string> seen;
+  std::size_t texts = 0;
+  const auto is_listed = [&](const std::string& field) {
+    EXPECT_NE(kind_of_text(field), TextKind::Unlisted)
+        << field << ": say in recorded_texts.cpp what it tells of people";
+    ++texts;
+  };
+  for (int i = 0; i < journal::kJournalTopicCount; ++i)
+    each_field(journal::topic_message(static_cast<journal::JournalTopic>(i)), seen, is_listed);
+  EXPECT_GT(texts, 20u);
+  each_field(*proto::ToolState::descriptor(), seen,
+             [](const std::string& field) { ADD_FAILURE() << field << ": tools have no text"; });
+  EXPECT_EQ(kind_of_text("trocar.proto.Participant.nickname"), TextKind::Unlisted);
+}
+
+TEST(anonymise, no_cell_of_a_table_is_a_formula) {
+  for (const char* name : {"=1+1", "+1", "-1", "@SUM(A1)"})
+    EXPECT_EQ(csv_text(name), std::string("\"'") + name + '"');
+  EXPECT_EQ(csv_text("Ann-Marie"), "\"Ann-Marie\"");
 }
 
 TEST(anonymise, it_overwrites_nothing) {

@@ -137,6 +137,52 @@ TEST(DatagramChannel, replayed_forged_and_garbled_datagrams_are_dropped) {
   EXPECT_EQ(link.at_server.size(), 2u) << "the session goes on";
 }
 
+// A record as anybody can write it who knows the address.
+Bytes record_of(int kind, int key_epoch, std::size_t size) {
+  const auto type = static_cast<std::uint8_t>(kind), epoch = static_cast<std::uint8_t>(key_epoch);
+  Bytes record{type, 0xfe, 0xfd, 0, epoch, 0, 0, 0, 0, 0, 99, 0, static_cast<std::uint8_t>(size)};
+  record.resize(record.size() + size, 2);  // of an alert: it is fatal
+  return record;
+}
+
+TEST(DatagramChannel, records_without_a_key_end_neither_side) {
+  Link link(make_key(1), make_key(1));
+  link.shake();
+  for (const int type : {20, 21, 22, 23, 24})
+    for (const int epoch : {0, 1, 2})
+      for (std::size_t size = 0; size < 64; ++size) {
+        link.hand_up(record_of(type, epoch, size));
+        link.hand_down(record_of(type, epoch, size));
+        ASSERT_EQ(link.server->state(), State::Open) << type << ' ' << epoch << ' ' << size;
+        ASSERT_EQ(link.client->state(), State::Open) << type << ' ' << epoch << ' ' << size;
+      }
+  link.up.clear();
+  link.down.clear();
+  ASSERT_TRUE(link.client->send(message_of(1)));
+  ASSERT_TRUE(link.server->send(message_of(2)));
+  link.settle();
+  EXPECT_EQ(link.at_server.size(), 1u);
+  EXPECT_EQ(link.at_client.size(), 1u);
+}
+
+TEST(DatagramChannel, alerts_without_a_key_end_no_handshake) {
+  Link link(make_key(1), make_key(1));
+  link.client->start();
+  for (int i = 0; i < 20 && !(link.up.empty() && link.down.empty()); ++i)
+    for (auto* way : {&link.up, &link.down}) {
+      if (way->empty()) continue;
+      const auto datagram = std::move(way->front());
+      way->pop_front();
+      for (const int epoch : {0, 1})
+        way == &link.up ? link.hand_up(record_of(21, epoch, 2))
+                        : link.hand_down(record_of(21, epoch, 2));
+      way == &link.up ? link.hand_up(datagram) : link.hand_down(datagram);
+    }
+  EXPECT_EQ(link.client->state(), State::Open);
+  ASSERT_TRUE(link.server);
+  EXPECT_EQ(link.server->state(), State::Open);
+}
+
 TEST(DatagramChannel, an_address_is_proved_before_anything_is_kept_or_sent_in_bulk) {
   Link link(make_key(1), make_key(1));
   link.client->start();

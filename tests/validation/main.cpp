@@ -10,8 +10,8 @@
 #include <ctime>
 #include <fstream>
 
-#include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "tests/validation/experiments.h"
@@ -179,6 +179,6 @@ int run(int argc, char** argv) {
 }  // namespace trocar::validation
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features("trocar-validate");
+  trocar::begin_program("trocar-validate");
   return trocar::validation::run(argc, argv);
 }

@@ -34,6 +34,16 @@ TEST(Range, OfAnotherFormCountsAsNone) {
     EXPECT_EQ(read_range(header, 1000).kind, RangeKind::Whole) << header;
 }
 
+TEST(Host, IsThisServersOwn) {
+  for (const auto* host : {"127.0.0.1:7691", "192.0.2.7", "[::1]:7691", "localhost:7691",
+                           "Watch.Example", "watch.example:443", "box:7691", "box.local"})
+    EXPECT_TRUE(is_own_host(host, "watch.example:7691", "box")) << host;
+  for (const auto* host : {"", ":7691", "evil.example", "watch.example.evil.example",
+                           "1.2.3.4.evil", "box.evil", "box.", "boxy"})
+    EXPECT_FALSE(is_own_host(host, "watch.example:7691", "box")) << host;
+  EXPECT_FALSE(is_own_host("watch.example", "", "")) << "nobody has said so";
+}
+
 TEST(Origin, IsExactlyThatOfTheHost) {
   EXPECT_TRUE(is_own_origin("https://watch.example:7691", "watch.example:7691", true));
   EXPECT_TRUE(is_own_origin("https://Watch.Example:7691", "watch.example:7691", true));

@@ -29,5 +29,12 @@ TEST(Roles, AnUnknownNumberIsUnknownAndHasNoTools) {
   EXPECT_STREQ(name_of(Role::Unknown), "unknown role");
 }
 
+TEST(Roles, EachHasItsArticle) {
+  EXPECT_EQ(one_of(Role::Surgeon), "a surgeon");
+  EXPECT_EQ(one_of(Role::Assistant), "an assistant");
+  EXPECT_EQ(one_of(Role::Instructor), "an instructor");
+  EXPECT_EQ(one_of(Role::Observer), "an observer");
+}
+
 }  // namespace
 }  // namespace trocar::wire

@@ -10,9 +10,9 @@
 #include <functional>
 #include <memory>
 
-#include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "server/app/hall/hall_bus.h"
@@ -126,7 +126,7 @@ int run(int argc, char** argv) {
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::begin_program(trocar::app::kProgram);
   trocar::ignore_broken_pipes();
   return trocar::app::run(argc, argv);
 }

@@ -125,6 +125,8 @@ struct HallServer::Core {
     const auto peer = socket.remote_endpoint(unknown).address().to_string();
     monitoring::HttpStream stream(std::move(socket), tls);
     stream.end_after(kRequestDeadline);
+    std::optional<monitoring::HttpAcceptor::Newcomer> newcomer(
+        std::in_place, acceptor, peer, [&stream] { stream.end_after(kRequestDeadline.zero()); });
     if (tls)
       if (const auto failed = co_await stream.below().accept_tls()) co_return;
     http::request_parser<http::string_body> parser;
@@ -132,6 +134,7 @@ struct HallServer::Core {
     parser.body_limit(hall::kMostRequestBytes);
     stream.end_after(kRequestDeadline);
     const auto failed = co_await stream.read(parser);
+    newcomer.reset();
     stream.end_never();
     Reply given;
     if (failed == http::error::body_limit)

@@ -8,9 +8,9 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "common/base/cpu.h"
 #include "common/base/json.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/stdout_check.h"
 #include "common/base/timing.h"
 #include "common/base/unfinished_file.h"
@@ -349,7 +349,7 @@ int run(int argc, char** argv) {
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::begin_program(trocar::app::kProgram);
   trocar::remove_unfinished_files_on_signals();
   return trocar::finish_output(trocar::app::kProgram, trocar::app::run(argc, argv));
 }

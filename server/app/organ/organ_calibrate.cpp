@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <map>
 
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 #include "common/base/progress_line.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"

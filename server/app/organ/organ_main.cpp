@@ -10,9 +10,9 @@
 #include <string>
 #include <string_view>
 
-#include "common/base/cpu.h"
 #include "common/base/log.h"
 #include "common/base/number_option.h"
+#include "common/base/program.h"
 #include "common/base/stdout_check.h"
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
@@ -548,6 +548,6 @@ int run(int argc, char** argv) {
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features("trocar-organ");
+  trocar::begin_program("trocar-organ");
   return trocar::finish_output("trocar-organ", trocar::app::run(argc, argv));
 }

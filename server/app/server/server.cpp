@@ -19,6 +19,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -138,6 +139,7 @@ class Server {
   std::uint64_t newest_ns_ = 0;                                          // when it came
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
+  std::optional<Status> closed_;  // the recording, once it is
   std::string goodbye_ = "the session is over";
   float rate_ = 1;            // as an instructor wants it
   bool is_awaiting_ = false;  // time begins when enough people are there
@@ -265,6 +267,7 @@ void Server::attend() {
   attention_.expires_after(kAttentionPeriod);
   attention_.async_wait([this](boost::system::error_code error) {
     if (error || !is_paused_ || is_ending_) return;
+    if (journal_) replicator_->set_recording(recording_state());
     replicator_->attend();
     attend();
   });
@@ -364,12 +367,10 @@ Status Server::run() {
 }
 
 void Server::on_signal(int signal) {
-  log::info("{}: ending the session", name_of_signal(signal));
+  log::info("{}: ending the session; more signals are ignored for {} s", name_of_signal(signal),
+            kEndSeconds);
+  ignore_ending_signals();
   loop_->request_stop();
-  signals_.cancel();
-  // A second one ends the process at once. A closed terminal may say SIGHUP twice.
-  boost::system::error_code ignored;
-  for (const int ending : {SIGINT, SIGTERM}) signals_.remove(ending, ignored);
 }
 
 void Server::publish_frames() {
@@ -495,7 +496,7 @@ void Server::begin_end() {
   publish_frames();
   is_ending_ = true;
   if (ghost_) ghost_->set_wanted(false);
-  signals_.cancel();
+  ignore_ending_signals();
   announcer_.reset();
   disk_timer_.cancel();
   tcp_->stop_accepting();
@@ -504,8 +505,13 @@ void Server::begin_end() {
            [this] { say_goodbye(); });
 }
 
+// Everybody hears whether the recording got its end.
 void Server::say_goodbye() {
   barrier_ = replicator_->barrier_results();
+  if (journal_) {
+    closed_ = journal_->close();
+    replicator_->set_recording(recording_state());
+  }
   replicator_->end_all(replication::EndReason::ServerClosing, goodbye_);
   wait_for([this] { return tcp_->connection_count() == 0; }, kGoodbyeDeadline,
            [this] { io_.stop(); });
@@ -522,6 +528,8 @@ void Server::wait_for(std::function<bool()> is_done, milliseconds deadline,
 
 Status Server::finish() {
   const Status written = write_end();
+  signals_.clear();  // which puts the default back
+  ignore_ending_signals();
   // The cluster may take the machine away from here on.
   if (std::exchange(sidecar_, nullptr))
     if (const auto told = agones::shut_down(sidecar_port_); !told)
@@ -531,8 +539,8 @@ Status Server::finish() {
 
 // Closes the recording, and writes the figures of the run.
 Status Server::write_end() {
-  Status closed;
-  if (journal_) closed = journal_->close();
+  if (journal_ && !closed_) closed_ = journal_->close();
+  const Status closed = closed_.value_or(Status{});
   const auto& report = loop_->report();
   std::size_t equal = 0;
   for (const auto& result : barrier_) equal += result.is_equal;

@@ -2,9 +2,9 @@
 
 #include <cstdio>
 
-#include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/signals.h"
 #include "common/base/time_slice.h"
 #include "server/app/server/check_start.h"
@@ -26,7 +26,7 @@ int check_config(const trocar::app::ServerOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(kProgram);
+  trocar::begin_program(kProgram);
   trocar::ignore_broken_pipes();
   const auto parsed = trocar::app::parse_command_line(argc, argv);
   if (!parsed) return trocar::report(kProgram, parsed.error());

@@ -11,8 +11,9 @@
 #include <optional>
 #include <string>
 
-#include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
+#include "common/base/signals.h"
 #include "common/base/stdout_check.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
@@ -73,6 +74,7 @@ struct Options {
 volatile std::sig_atomic_t has_stop_signal = 0;
 extern "C" void request_stop(int) {
   has_stop_signal = 1;
+  trocar::ignore_ending_signals();
 }
 
 // On a terminal, a line on stderr is rewritten once a run has taken two seconds.
@@ -248,8 +250,7 @@ Result<std::filesystem::path> make_folder(const std::filesystem::path& folder) {
   if (failed)
     return Error{ErrorCode::ResourceMissing,
                  folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
+  for (const int signal : ending_signals()) std::signal(signal, request_stop);
   return folder;
 }
 
@@ -367,6 +368,6 @@ int run(int argc, char** argv) {
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features("trocar-sim");
+  trocar::begin_program("trocar-sim");
   return trocar::finish_output("trocar-sim", trocar::app::run(argc, argv));
 }

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
+#include "common/base/program.h"
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "server/app/web/web_start.h"
@@ -94,7 +94,7 @@ int run(int argc, char** argv) {
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::require_cpu_features(trocar::app::kProgram);
+  trocar::begin_program(trocar::app::kProgram);
   trocar::ignore_broken_pipes();
   return trocar::app::run(argc, argv);
 }

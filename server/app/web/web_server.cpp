@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/http.hpp>
 #include <map>
@@ -73,6 +74,9 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   // Whoever is connected can be cut: by closing its socket, or its watcher.
   std::uint64_t next_id = 1;
   std::map<std::uint64_t, std::function<void()>> cuts;
+  // Who has not asked for anything, or for nothing more: the oldest is cut where there is no room.
+  std::map<std::uint64_t, std::string> silent;
+  const std::string machine = asio::ip::host_name();
   bool is_stopping = false;
 
   Core(asio::io_context& io, const WebOptions& given, WebContent what, secure::TlsContext with)
@@ -116,15 +120,32 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     return {};
   }
 
+  // Cuts the oldest who is silent, of that address or of the one that has most of these.
+  bool make_room(const std::string& peer, bool is_of_same) {
+    std::map<std::string, std::size_t> counts;
+    std::size_t most = 0;
+    for (const auto& [id, address] : silent) most = std::max(most, ++counts[address]);
+    const auto oldest = std::ranges::find_if(silent, [&](const auto& one) {
+      return is_of_same ? one.second == peer : counts[one.second] == most;
+    });
+    if (oldest == silent.end()) return false;
+    const auto cut = cuts.at(oldest->first);
+    silent.erase(oldest);
+    cut();
+    return true;
+  }
+
   bool admit(const std::string& peer) {
-    auto& from_there = open_by_address[access::counted_as(peer)];
-    if (counters.open >= static_cast<std::size_t>(options.most_connections) ||
-        from_there >= options.most_per_address) {
+    const auto address = access::counted_as(peer);
+    const auto found = open_by_address.find(address);
+    const bool is_address_full =
+        found != open_by_address.end() && found->second >= options.most_per_address;
+    const bool is_full = counters.open >= static_cast<std::size_t>(options.most_connections);
+    if ((is_address_full || is_full) && !make_room(address, is_address_full)) {
       ++counters.refused_full;
-      if (from_there == 0) open_by_address.erase(access::counted_as(peer));
       return false;
     }
-    ++from_there;
+    ++open_by_address[address];
     ++counters.open;
     ++counters.connections;
     return true;
@@ -157,7 +178,9 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     socket.set_option(tcp::no_delay(true), ignored);
     socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
     const auto self = shared_from_this();
-    const auto ended = [self, peer](std::exception_ptr failure) {
+    const auto id = next_id++;
+    const auto ended = [self, peer, id](std::exception_ptr failure) {
+      self->silent.erase(id);
       self->forget(peer);
       rethrow(failure);
     };
@@ -165,17 +188,28 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       asio::co_spawn(context,
                      serve_tls(beast::ssl_stream<beast::tcp_stream>(
                                    beast::tcp_stream(std::move(socket)), *tls),
-                               peer),
+                               peer, id),
                      ended);
     else
-      asio::co_spawn(context, serve(beast::tcp_stream(std::move(socket)), peer), ended);
+      asio::co_spawn(context, serve(beast::tcp_stream(std::move(socket)), peer, id), ended);
   }
 
-  asio::awaitable<void> serve_tls(beast::ssl_stream<beast::tcp_stream> stream, std::string peer) {
+  asio::awaitable<void> serve_tls(beast::ssl_stream<beast::tcp_stream> stream, std::string peer,
+                                  std::uint64_t id) {
+    note_silent(id, peer, stream);
     beast::get_lowest_layer(stream).expires_after(kHandshakeDeadline);
     const auto [error] = co_await stream.async_handshake(asio::ssl::stream_base::server, kNoThrow);
-    if (error) co_return;
-    co_await serve(std::move(stream), std::move(peer));
+    if (error) {
+      cuts.erase(id);
+      co_return;
+    }
+    co_await serve(std::move(stream), std::move(peer), id);
+  }
+
+  template <typename Stream>
+  void note_silent(std::uint64_t id, const std::string& peer, Stream& stream) {
+    cuts[id] = [&stream] { beast::get_lowest_layer(stream).close(); };
+    silent[id] = access::counted_as(peer);
   }
 
   template <typename Stream>
@@ -197,15 +231,23 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   }
 
   template <typename Stream>
-  asio::awaitable<void> serve(Stream stream, std::string peer) {
-    const auto id = next_id++;
+  asio::awaitable<void> serve(Stream stream, std::string peer, std::uint64_t id) {
     beast::flat_buffer buffer(kMostHeaderBytes + 4096);
     bool goes_on = true;
     while (goes_on && !is_stopping) {
       Request request;
-      cuts[id] = [&stream] { beast::get_lowest_layer(stream).close(); };
+      note_silent(id, peer, stream);
       const bool is_read = co_await read_request(stream, buffer, request);
+      silent.erase(id);
       if (!is_read) break;
+      if (!site::is_own_host(view_of(request[http::field::host]), options.public_name, machine)) {
+        ++counters.forbidden;
+        request.keep_alive(false);
+        Answer refusal = refuse(request, http::status::misdirected_request,
+                                "This server has another name: see --public-name.\n");
+        co_await send(stream, request, refusal);
+        break;
+      }
       if (beast::websocket::is_upgrade(request) && view_of(request.target()) == "/session") {
         const bool is_own =
             site::is_own_origin(view_of(request[http::field::origin]),

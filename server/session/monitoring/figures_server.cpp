@@ -2,6 +2,8 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/beast/http/empty_body.hpp>
+#include <optional>
+#include <utility>
 
 #include "server/session/monitoring/exposition.h"
 #include "server/session/monitoring/http_acceptor.h"
@@ -23,11 +25,16 @@ struct FiguresServer::Core {
       : answers(std::move(given)), acceptor(context, kMostConnections) {}
 
   asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
+    boost::system::error_code unknown;
+    const auto peer = socket.remote_endpoint(unknown).address().to_string();
     HttpStream stream(std::move(socket), nullptr);
     stream.end_after(kDeadline);
+    std::optional<HttpAcceptor::Newcomer> newcomer(
+        std::in_place, acceptor, peer, [&stream] { stream.end_after(kDeadline.zero()); });
     http::request_parser<http::empty_body> parser;
     parser.header_limit(kMostHeaderBytes);
     const auto failed = co_await stream.read(parser, true);
+    newcomer.reset();
     if (failed || acceptor.is_stopping()) co_return;
     const auto answer = answer_to(parser.get());
     const auto unsent = co_await stream.write(answer);

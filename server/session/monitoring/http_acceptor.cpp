@@ -1,5 +1,6 @@
 #include "server/session/monitoring/http_acceptor.h"
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <exception>
@@ -39,6 +40,25 @@ Status HttpAcceptor::open(const std::string& address, std::uint16_t port,
                                                ": " + error.message() + ", choose another port"};
 }
 
+HttpAcceptor::Newcomer::Newcomer(HttpAcceptor& acceptor, std::string address,
+                                 std::function<void()> cut)
+    : acceptor_(acceptor), id_(acceptor.next_id_++) {
+  acceptor_.newcomers_.emplace(id_, Waiting{std::move(address), std::move(cut)});
+}
+
+bool HttpAcceptor::make_room() {
+  std::map<std::string, std::size_t> counts;
+  std::size_t most = 0;
+  for (const auto& [id, one] : newcomers_) most = std::max(most, ++counts[one.address]);
+  const auto oldest = std::ranges::find_if(
+      newcomers_, [&](const auto& one) { return counts[one.second.address] == most; });
+  if (oldest == newcomers_.end()) return false;
+  const auto cut = std::move(oldest->second.cut);
+  newcomers_.erase(oldest);
+  cut();
+  return true;
+}
+
 void HttpAcceptor::start(Serve serve, const std::shared_ptr<void>& owner) {
   asio::co_spawn(context_, accept(std::move(serve), owner), rethrow);
 }
@@ -53,7 +73,7 @@ asio::awaitable<void> HttpAcceptor::accept(Serve serve, std::shared_ptr<void> ow
       co_await retry.async_wait(kNoThrow);
       continue;
     }
-    if (open_ >= most_connections_) continue;  // closes it
+    if (open_ >= most_connections_ && !make_room()) continue;  // closes it
     ++open_;
     asio::co_spawn(context_, serve(std::move(socket)),
                    [this, owner](const std::exception_ptr& failure) {

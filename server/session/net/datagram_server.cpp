@@ -1,10 +1,12 @@
 #include "server/session/net/datagram_server.h"
 
-#include <boost/asio/buffer.hpp>
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
+#include <cerrno>
 
 #include "common/base/no_throw.h"
+#include "server/session/net/datagram_socket.h"
 
 namespace trocar::net {
 namespace {
@@ -41,6 +43,8 @@ Result<std::unique_ptr<DatagramServer>> DatagramServer::open(asio::io_context& c
   std::unique_ptr<DatagramServer> server(new DatagramServer(context, std::move(deliver)));
   boost::system::error_code error, ignored;
   server->socket_.open(endpoint.protocol(), error);
+  if (!error && !ask_for_local_addresses(server->socket_))
+    error = boost::system::error_code(errno, boost::system::system_category());
   if (!error) server->socket_.bind(endpoint, error);
   if (!error) server->socket_.non_blocking(true, error);
   if (error)
@@ -59,11 +63,10 @@ asio::awaitable<void> DatagramServer::receive(std::shared_ptr<bool> is_alive) {
     const auto [error] = co_await socket_.async_wait(udp::socket::wait_read, kNoThrow);
     if (!*is_alive || error) break;
     for (int i = 0; i < kDatagramsPerWake; ++i) {
-      Endpoint peer;
-      boost::system::error_code failed;
-      const auto count = socket_.receive_from(asio::buffer(room), peer, 0, failed);
-      if (failed) break;  // nothing more there; or a peer that is gone, of which the stream tells
-      take(peer, BytesView(room).first(count));
+      const auto arrival = receive_datagram(socket_, room);
+      if (!arrival) break;  // nothing more there; or a peer that is gone, of which the stream tells
+      arrived_at_ = arrival->local;
+      take(arrival->peer, BytesView(room).first(arrival->bytes));
       if (!*is_alive) co_return;
     }
   }
@@ -95,11 +98,31 @@ void DatagramServer::greet(const Endpoint& peer, BytesView datagram) {
   auto channel = listener_.receive(datagram, text_of(peer),
                                    [this, peer](BytesView bytes) { send_to(peer, bytes); });
   if (!channel) return;
-  if (unfinished() >= kMaxUnfinished) {
-    ++counters_.refused;
-    return;
+  make_room_for_newcomer(peer);
+  paths_[peer] = {std::move(channel), 0, arrived_at_, Clock::now()};
+}
+
+// Who means it is done in milliseconds. Of too many the oldest goes, of the address that has most:
+// so who leaves many unfinished drives out his own.
+void DatagramServer::make_room_for_newcomer(const Endpoint& peer) {
+  std::map<asio::ip::address, std::size_t> counts;
+  std::size_t unfinished = 0;
+  for (const auto& [endpoint, path] : paths_) {
+    if (path.connection != 0) continue;
+    ++unfinished;
+    ++counts[endpoint.address()];
   }
-  paths_[peer] = {std::move(channel), 0, Clock::now()};
+  const bool has_room = unfinished < kMaxUnfinished;
+  if (has_room && counts[peer.address()] < kMaxUnfinishedPerAddress) return;
+  const auto most =
+      std::ranges::max_element(counts, {}, [](const auto& one) { return one.second; })->second;
+  auto oldest = paths_.end();
+  for (auto next = paths_.begin(); next != paths_.end(); ++next)
+    if (next->second.connection == 0 && counts[next->first.address()] == most &&
+        (oldest == paths_.end() || next->second.begin < oldest->second.begin))
+      oldest = next;
+  paths_.erase(oldest);
+  ++counters_.refused;
 }
 
 // A handshake that is finished gives its connection a path, in place of any other.
@@ -118,16 +141,11 @@ void DatagramServer::settle(const Endpoint& peer, Path& path) {
 }
 
 void DatagramServer::send_to(const Endpoint& peer, BytesView datagram) {
-  boost::system::error_code error;
-  socket_.send_to(asio::buffer(datagram.data(), datagram.size()), peer, 0, error);
-  ++(error ? counters_.dropped : counters_.sent);
-  if (!error) counters_.bytes_out += datagram.size();
-}
-
-std::size_t DatagramServer::unfinished() const {
-  std::size_t count = 0;
-  for (const auto& [peer, path] : paths_) count += path.connection == 0;
-  return count;
+  const auto path = paths_.find(peer);
+  const bool is_sent = send_datagram(socket_, datagram, peer,
+                                     path == paths_.end() ? arrived_at_ : path->second.local);
+  ++(is_sent ? counters_.sent : counters_.dropped);
+  if (is_sent) counters_.bytes_out += datagram.size();
 }
 
 void DatagramServer::expect(ConnectionId id, const secure::DatagramKey& key) {

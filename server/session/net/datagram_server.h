@@ -5,9 +5,10 @@
 // handshake with the same key, from wherever, replaces the path: so does a client whose address
 // has changed.
 //
-// Bounds: nothing is kept for an address before it has shown a cookie; at most
-// `max_unfinished` handshakes run at a time, each for `handshake_deadline`; nothing is queued:
-// what the socket does not take is dropped and counted.
+// Bounds: nothing is kept for an address before it has shown a cookie; at most kMaxUnfinished
+// handshakes run at a time, kMaxUnfinishedPerAddress of one address, each for kHandshakeDeadline:
+// a newer one drives the oldest out. Nothing is queued: what the socket does not take is dropped
+// and counted. Answers go from the address of this machine to which a handshake came.
 //
 // Thread: the one that runs the I/O context.
 
@@ -30,13 +31,13 @@ struct DatagramCounters {
   std::uint64_t received = 0, sent = 0, dropped = 0;  // dropped: not taken by the socket
   std::uint64_t bytes_in = 0, bytes_out = 0;          // sealed
   std::uint64_t paths = 0;                            // handshakes that were finished
-  std::uint64_t refused = 0;                          // too many unfinished handshakes
+  std::uint64_t refused = 0;                          // unfinished, driven out by newer ones
 };
 
 class DatagramServer {
  public:
   using Deliver = std::function<void(ConnectionId, BytesView)>;
-  static constexpr std::size_t kMaxUnfinished = 64;
+  static constexpr std::size_t kMaxUnfinished = 64, kMaxUnfinishedPerAddress = 32;
   static constexpr std::chrono::seconds kHandshakeDeadline{5};
 
   // Binds; ErrorCode::ResourceMissing when the port cannot be had.
@@ -61,6 +62,7 @@ class DatagramServer {
   struct Path {
     std::unique_ptr<secure::DatagramChannel> channel;
     ConnectionId connection = 0;  // 0: its handshake is not finished
+    asio::ip::address local;      // of this machine, to which it came
     Clock::time_point begin{};
   };
 
@@ -70,7 +72,7 @@ class DatagramServer {
   void greet(const Endpoint& peer, BytesView datagram);
   void settle(const Endpoint& peer, Path& path);
   void send_to(const Endpoint& peer, BytesView datagram);
-  std::size_t unfinished() const;
+  void make_room_for_newcomer(const Endpoint& peer);
 
   asio::ip::udp::socket socket_;
   const Deliver deliver_;
@@ -80,6 +82,7 @@ class DatagramServer {
   std::map<Endpoint, Path> paths_;
   secure::DatagramListener listener_;
   DatagramCounters counters_;
+  asio::ip::address arrived_at_;  // of this machine, to which the newest datagram came
   std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };
 

@@ -62,7 +62,7 @@ Result<Participant> Roster::join(std::string_view name, Role role,
   if (!is_valid_name(name)) return refuse(JoinRefusal::NameInvalid, kNameRule);
   if (!wire::rights_of(role).may_have_tools && !tools.empty())
     return refuse(JoinRefusal::ToolsInvalid,
-                  std::string("tools: an ") + name_of(role) + " watches and has none");
+                  "tools: " + wire::one_of(role) + " watches and has none");
   if (tools.size() > static_cast<std::size_t>(places_.tools))
     return refuse(JoinRefusal::ToolsInvalid, "tools: " + std::to_string(tools.size()) +
                                                  " are too many, at most " +

@@ -3,6 +3,7 @@
 #include <google/protobuf/message.h>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
 #include "server/session/recording/pseudonyms.h"
+#include "server/session/recording/recorded_texts.h"
 
 namespace trocar::recording {
 namespace {
@@ -21,22 +23,11 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using journal::JournalTopic;
 
-constexpr JournalTopic kTopicsOfPeople[] = {JournalTopic::Participants, JournalTopic::Claims,
-                                            JournalTopic::FrameState,   JournalTopic::Lesson,
-                                            JournalTopic::Overview,     JournalTopic::Hands};
-// These hold one name each, and nothing else.
-constexpr std::string_view kNames[] = {
-    "trocar.proto.Participant.name", "trocar.proto.Participant.frozen_by",
-    "trocar.proto.Participants.waiting", "trocar.proto.ClaimEvent.holder_name",
-    "trocar.proto.SessionPace.by"};
 constexpr const char* kTakenOut = "(words taken out)";
+constexpr std::string_view kToolTopics = "/tool/";  // states of tools: no text
 
-bool is_name(const FieldDescriptor& field) {
-  return std::ranges::find(kNames, std::string_view(field.full_name())) != std::end(kNames);
-}
-
-// Calls `visit(field, text)` for each text in a message and in those that it holds; what it gives
-// back is put there.
+// Calls `visit(message, field, text)` for each text in a message and in those that it holds; what
+// it gives back is put there.
 template <typename Visitor>
 void each_text(Message& message, const Visitor& visit) {
   const auto& reflection = *message.GetReflection();
@@ -52,25 +43,56 @@ void each_text(Message& message, const Visitor& visit) {
       } else if (field->type() == FieldDescriptor::TYPE_STRING) {
         if (field->is_repeated())
           reflection.SetRepeatedString(
-              &message, field, i, visit(*field, reflection.GetRepeatedString(message, field, i)));
+              &message, field, i,
+              visit(message, *field, reflection.GetRepeatedString(message, field, i)));
         else
           reflection.SetString(&message, field,
-                               visit(*field, reflection.GetString(message, field)));
+                               visit(message, *field, reflection.GetString(message, field)));
       }
     }
   }
 }
 
-// Talk, notes and reasons stand behind the first colon of a line, which says whose they are.
-bool has_words(const proto::TeachEvent& event) {
-  return event.action() == proto::TEACH_CHAT || event.action() == proto::TEACH_NOTE ||
-         event.action() == proto::TEACH_EXPEL;
+// Entries of metadata that say nothing of people. Others hold names of files.
+constexpr std::string_view kHarmlessEntries[] = {
+    "averaged_strain", "continues_tick",   "damaged_chunks",
+    "dropped_bytes",   "external_loads",   "from_tick",
+    "joins",           "organ_hash",       "organ_name",
+    "people",          "protocol",         "reduction_file",
+    "reduction_hash",  "reduction_source", "sim_version",
+    "start",           "start_utc",        "start_utc_ns",
+    "to_tick",         "trimmed_tick",     "words"};
+
+journal::McapMetadata without_files(journal::McapMetadata metadata) {
+  for (auto& [key, value] : metadata.entries)
+    if (std::ranges::find(kHarmlessEntries, std::string_view(key)) == std::end(kHarmlessEntries))
+      value = "(name taken out)";
+  return metadata;
 }
-bool take_out_words(proto::TeachEvent& event, bool keeps_words) {
-  const auto colon = event.text().find(": ");
-  if (!has_words(event) || colon == std::string::npos) return false;
-  if (!keeps_words) event.set_text(event.text().substr(0, colon + 2) + kTakenOut);
-  return true;
+
+// What stands between two words of a sentence, such as a name that no list holds.
+std::string between(const std::string& text, std::string_view before, std::string_view after) {
+  const auto begin = text.find(before);
+  if (begin == std::string::npos) return {};
+  const auto from = begin + before.size();
+  return text.substr(from, text.rfind(after) - from);
+}
+
+// Where words that people typed begin in such an event's line; npos: there are none. Names in it
+// are pseudonyms already.
+std::size_t begin_of_words(const proto::TeachEvent& event, const std::string& text) {
+  switch (event.action()) {
+    case proto::TEACH_CHAT:
+    case proto::TEACH_NOTE:
+    case proto::TEACH_EXPEL: {
+      const auto colon = text.find(": ");
+      return colon == std::string::npos ? colon : colon + 2;
+    }
+    case proto::TEACH_NONE:  // of a mark, or a lesson's news
+      return text.starts_with("the instructor has ") ? text.find('"') : std::string::npos;
+    default:  // a newer program's may be anything
+      return proto::TeachAction_IsValid(event.action()) ? std::string::npos : 0;
+  }
 }
 
 class Anonymiser {
@@ -83,14 +105,14 @@ class Anonymiser {
   Status collect(journal::McapReader& reader) {
     Status decoded;
     const auto report = reader.read(
-        [](const journal::McapChannel& channel) { return topic_of_people(channel).has_value(); },
-        {},
+        [](const journal::McapChannel& channel) { return tells_of_people(channel); }, {},
         [&](const journal::McapMessage& message) {
           const auto& channel = reader.channels().at(message.channel_id);
           decoded = decode(channel, message);
           if (!decoded) return false;
-          each_text(*message_, [&](const FieldDescriptor& field, const std::string& text) {
-            if (is_name(field)) pseudonyms_.add(text);
+          each_text(*message_, [&](const Message& holder, const FieldDescriptor& field,
+                                   const std::string& text) {
+            add_names(holder, kind_of_text(field.full_name()), text);
             return text;
           });
           return true;
@@ -100,16 +122,31 @@ class Anonymiser {
 
   Result<BytesView> change(const journal::McapChannel& channel,
                            const journal::McapMessage& message) {
-    if (!topic_of_people(channel)) return message.data;
+    const auto topic = journal::topic_of(channel.topic);
+    if (!topic && !channel.topic.starts_with(kToolTopics))
+      return Error{ErrorCode::BadFile,
+                   path_ + ": " + channel.topic +
+                       ": a newer program has written it, and it may hold names: use that one"};
+    if (!tells_of_people(channel)) return message.data;
     if (auto decoded = decode(channel, message); !decoded) return decoded.error();
-    if (auto* record = dynamic_cast<proto::LessonRecord*>(message_.get());
-        record && record->has_teach())
-      words_ += take_out_words(*record->mutable_teach(), keeps_words_);
-    if (auto* overview = dynamic_cast<proto::Overview*>(message_.get()))
-      for (auto& event : *overview->mutable_lesson()) take_out_words(event, keeps_words_);
-    each_text(*message_, [&](const FieldDescriptor& field, const std::string& text) {
-      return is_name(field) ? pseudonyms_.of_name(text) : pseudonyms_.within(text);
-    });
+    each_text(*message_,
+              [&](const Message& holder, const FieldDescriptor& field,
+                  const std::string& text) -> std::string {
+                switch (kind_of_text(field.full_name())) {
+                  case TextKind::Harmless:
+                    return text;
+                  case TextKind::Name:
+                    return pseudonyms_.of_name(text);
+                  case TextKind::Sentence:
+                    return pseudonyms_.within(text);
+                  case TextKind::Teaching:
+                    return without_words(static_cast<const proto::TeachEvent&>(holder),
+                                         *topic == JournalTopic::Lesson, pseudonyms_.within(text));
+                  case TextKind::Unlisted:
+                    break;
+                }
+                return kTakenOut;
+              });
     bytes_.resize(message_->ByteSizeLong());
     message_->SerializeToArray(bytes_.data(), static_cast<int>(bytes_.size()));
     return BytesView(bytes_);
@@ -119,14 +156,26 @@ class Anonymiser {
   std::uint64_t words() const { return words_; }
 
  private:
-  static std::optional<JournalTopic> topic_of_people(const journal::McapChannel& channel) {
+  static bool tells_of_people(const journal::McapChannel& channel) {
     const auto topic = journal::topic_of(channel.topic);
-    const bool is_one =
-        topic && std::ranges::find(kTopicsOfPeople, *topic) != std::end(kTopicsOfPeople);
-    return is_one ? topic : std::nullopt;
+    return topic && recording::tells_of_people(journal::topic_message(*topic));
+  }
+  // Who waited is in no list, and neither is a name before it was changed.
+  void add_names(const Message& holder, TextKind kind, const std::string& text) {
+    if (kind == TextKind::Name) pseudonyms_.add(text);
+    if (kind != TextKind::Teaching) return;
+    const auto action = static_cast<const proto::TeachEvent&>(holder).action();
+    if (action == proto::TEACH_ADMIT) pseudonyms_.add(between(text, " lets ", " in"));
+    if (action == proto::TEACH_RENAME) pseudonyms_.add(between(text, " has renamed ", " to "));
+  }
+  std::string without_words(const proto::TeachEvent& event, bool counts, std::string text) {
+    const auto begin = begin_of_words(event, text);
+    if (begin == std::string::npos) return text;
+    words_ += counts;
+    return keeps_words_ ? text : text.substr(0, begin) + kTakenOut;
   }
   Status decode(const journal::McapChannel& channel, const journal::McapMessage& message) {
-    const auto& kind = journal::topic_message(*topic_of_people(channel));
+    const auto& kind = journal::topic_message(*journal::topic_of(channel.topic));
     message_.reset(
         google::protobuf::MessageFactory::generated_factory()->GetPrototype(&kind)->New());
     const bool is_read =
@@ -169,7 +218,7 @@ Result<AnonymiseReport> anonymise(const std::string& from, const std::string& to
       [&](const journal::McapChannel& channel, const journal::McapMessage& message) {
         return anonymiser.change(channel, message);
       },
-      note);
+      note, without_files);
   if (!copied) return copied.error();
   return AnonymiseReport{anonymiser.people(), anonymiser.words()};
 }

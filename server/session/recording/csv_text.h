@@ -6,9 +6,11 @@
 
 namespace trocar::recording {
 
-// Makes a cell of a table (CSV): printable, in quotation marks.
+// Makes a cell of a table (CSV): printable, in quotation marks, and no formula to a spreadsheet
+// program, which takes it for text by the apostrophe.
 inline std::string csv_text(const std::string& text) {
   std::string out = "\"";
+  if (text.find_first_of("=+-@") == 0) out += '\'';
   for (const char c : printable(text)) {
     if (c == '"') out += '"';
     out += c;

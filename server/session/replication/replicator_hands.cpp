@@ -17,9 +17,8 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
                                                             bool is_ordered) {
   const auto& participant = *client.participant;
   if (!participant.slot.has_tools())
-    return Ending{EndReason::Role, std::string("ToolSample: an ") +
-                                       participants::name_of(participant.role) +
-                                       " watches and has no tools"};
+    return Ending{EndReason::Role,
+                  "ToolSample: " + wire::one_of(participant.role) + " watches and has no tools"};
   const auto checked = check_tool_sample(sample, participant.tools.size());
   if (!checked) return Ending{EndReason::ProtocolError, checked.error().message};
   auto& last = client.last_sequence[static_cast<std::size_t>(checked->tool)];
@@ -42,9 +41,8 @@ std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
                                                                  const proto::HandReport& message) {
   const auto& participant = *client.participant;
   if (!participant.slot.has_tools())
-    return Ending{EndReason::Role, std::string("HandReport: an ") +
-                                       participants::name_of(participant.role) +
-                                       " watches and has no hands"};
+    return Ending{EndReason::Role,
+                  "HandReport: " + wire::one_of(participant.role) + " watches and has no hands"};
   auto report = check_hand_report(message, participant.tools.size());
   if (!report) return Ending{EndReason::ProtocolError, report.error().message};
   const auto moments = static_cast<double>(report->moments.size());
@@ -72,9 +70,8 @@ std::optional<Replicator::Ending> Replicator::handle_tool_change(Client& client,
                                                                  const proto::ToolChange& change) {
   auto& participant = *client.participant;
   if (!participant.slot.has_tools())
-    return Ending{EndReason::Role, std::string("ToolChange: an ") +
-                                       participants::name_of(participant.role) +
-                                       " watches and has no tools"};
+    return Ending{EndReason::Role,
+                  "ToolChange: " + wire::one_of(participant.role) + " watches and has no tools"};
   const auto number = static_cast<std::size_t>(change.tool());
   if (number >= participant.tools.size())
     return Ending{EndReason::ProtocolError, "ToolChange.tool: " + std::to_string(number) +

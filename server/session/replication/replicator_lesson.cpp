@@ -88,9 +88,9 @@ std::optional<Replicator::Ending> Replicator::handle_lesson(Client& client,
                                                 " is not 1 (answer), 2 (next) or 3 (restart)"};
   if (answers ? !slot.has_tools() : !wire::rights_of(role).may_teach)
     return Ending{EndReason::Role, std::string("LessonRequest: ") +
-                                       (answers ? "who answers has a tool, not an "
-                                                : "stages are the instructor's, not of an ") +
-                                       participants::name_of(role)};
+                                       (answers ? "who answers has a tool, not "
+                                                : "stages are the instructor's, not of ") +
+                                       wire::one_of(role)};
   if (answers && request.tool() >= client.participant->tools.size())
     return Ending{EndReason::ProtocolError,
                   "LessonRequest.tool: " + std::to_string(request.tool()) + ", you have " +

@@ -22,8 +22,7 @@ std::optional<Replicator::Ending> Replicator::handle_mark(Client& client,
   const auto role = client.participant->role;
   if (!wire::rights_of(role).may_mark)
     return Ending{EndReason::Role,
-                  std::string("MarkRequest: marks are the instructor's, not of an ") +
-                      participants::name_of(role)};
+                  "MarkRequest: marks are the instructor's, not of " + wire::one_of(role)};
   const int action = request.action();
   if (action != proto::MARK_SET && action != proto::MARK_RETURN)
     return Ending{EndReason::ProtocolError, "MarkRequest.action: " + std::to_string(action) +

@@ -31,8 +31,7 @@ std::optional<Replicator::Ending> Replicator::handle_point(Client& client,
   const auto role = client.participant->role;
   if (!wire::rights_of(role).may_point)
     return Ending{EndReason::Role,
-                  std::string("PointRequest: pointing is the instructor's, not of an ") +
-                      participants::name_of(role)};
+                  "PointRequest: pointing is the instructor's, not of " + wire::one_of(role)};
   const bool points = request.has_position_m();
   if (points)
     if (const auto valid = check_place(request.position_m()); !valid)
@@ -61,8 +60,7 @@ std::optional<Replicator::Ending> Replicator::handle_stroke(Client& client,
   const auto role = client.participant->role;
   if (!wire::rights_of(role).may_point)
     return Ending{EndReason::Role,
-                  std::string("StrokeRequest: drawing is the instructor's, not of an ") +
-                      participants::name_of(role)};
+                  "StrokeRequest: drawing is the instructor's, not of " + wire::one_of(role)};
   const auto points = check_stroke(request);
   if (!points) return Ending{EndReason::ProtocolError, points.error().message};
   const auto slot = client.participant->slot;

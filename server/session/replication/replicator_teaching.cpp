@@ -78,8 +78,7 @@ std::optional<Replicator::Ending> Replicator::handle_teach(Client& client,
   const bool is_chat = order->action == TeachAction::Chat;
   if (!is_chat && !wire::rights_of(role).may_teach)
     return Ending{EndReason::Role, std::string("TeachRequest: \"") + name_of(order->action) +
-                                       "\" is the instructor's, not of an " +
-                                       participants::name_of(role)};
+                                       "\" is the instructor's, not of " + wire::one_of(role)};
   const auto slot = client.participant->slot;
   const auto refuse = [&](const std::string& why) {
     proto::Envelope answer;

@@ -57,6 +57,21 @@ AskedRange read_range(std::string_view header, std::uint64_t size) {
   return {.kind = RangeKind::Part, .range = {*from, last - *from + 1}};
 }
 
+bool is_own_host(std::string_view host, std::string_view public_name, std::string_view machine) {
+  const auto without_port = [](std::string_view name) {
+    const bool is_v6 = name.starts_with('[');
+    return name.substr(0, is_v6 ? name.find(']') + 1 : name.find(':'));
+  };
+  const auto name = without_port(host);
+  if (name.starts_with('[')) return true;
+  if (!name.empty() && name.find_first_not_of("0123456789.") == std::string_view::npos) return true;
+  const auto is = [&](std::string_view known) {
+    return !known.empty() && std::ranges::equal(name, known, {}, lower, lower);
+  };
+  return is("localhost") || is(without_port(public_name)) || is(machine) ||
+         is(std::string(machine) + ".local");
+}
+
 bool is_own_origin(std::string_view origin, std::string_view host, bool has_tls) {
   const std::string own = (has_tls ? "https://" : "http://") + std::string(host);
   return !host.empty() && std::ranges::equal(origin, own, {}, lower, lower);

@@ -23,6 +23,9 @@ struct AskedRange {
 // bytes. Other forms count as none, as RFC 9110 allows.
 AskedRange read_range(std::string_view header, std::uint64_t size);
 
+// True if a request's Host names this server: by an address, as localhost, by the machine's name,
+// or by the one that links have. A page of another name that was made to lead here is none of it.
+bool is_own_host(std::string_view host, std::string_view public_name, std::string_view machine);
 // True if `origin` ("https://HOST[:PORT]") names exactly what the request asked for in its Host
 // header, by this server's scheme. A page of another site cannot say so.
 bool is_own_origin(std::string_view origin, std::string_view host, bool has_tls);

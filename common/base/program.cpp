@@ -1,5 +1,6 @@
-#include "common/base/cpu.h"
+#include "common/base/program.h"
 
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 
@@ -7,7 +8,8 @@
 
 namespace trocar {
 
-void require_cpu_features(const char* program) {
+void begin_program(const char* program) {
+  std::signal(SIGXFSZ, SIG_IGN);
   __builtin_cpu_init();
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
       __builtin_cpu_supports("bmi2"))
