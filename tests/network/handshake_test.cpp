@@ -238,6 +238,22 @@ TEST(Handshake, the_host_may_want_fewer_hands_watchers_and_tools) {
   EXPECT_EQ(no_watcher.reason(), proto::GOODBYE_FULL);
 }
 
+TEST(Handshake, observers_leave_room_for_who_leads) {
+  replication::ReplicatorOptions options;
+  options.places = {.watchers = 10};
+  LiveSession session({}, options);
+  std::vector<std::unique_ptr<RawClient>> observers;
+  for (int i = 0; i < 9; ++i) {
+    observers.push_back(std::make_unique<RawClient>(session.port()));
+    ASSERT_TRUE(observers.back()->join("observer " + std::to_string(i), proto::ROLE_OBSERVER));
+  }
+  const auto refused = refusal_of(session, make_hello("late", proto::ROLE_OBSERVER));
+  EXPECT_EQ(refused.reason(), proto::GOODBYE_FULL);
+  EXPECT_NE(refused.text().find("all 9 places for watchers"), std::string::npos) << refused.text();
+  RawClient instructor(session.port());
+  EXPECT_TRUE(instructor.join("Ivy", proto::ROLE_INSTRUCTOR));
+}
+
 TEST(Handshake, when_many_come_at_once_those_who_are_here_are_told_once) {
   std::atomic<std::uint64_t> clock_ns{1'000'000'000};
   replication::ReplicatorOptions options;

@@ -11,6 +11,11 @@ namespace {
 
 constexpr std::size_t kMaxNameBytes = 32;
 
+// Places for watchers that observers leave free, however many come: a session is led by somebody.
+int kept_for_instructors(int watchers) {
+  return watchers < 2 ? 0 : std::max(1, watchers / 10);
+}
+
 std::string print_mm(float mm) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), mm);
@@ -81,7 +86,8 @@ Result<Participant> Roster::join(std::string_view name, Role role,
 
   const bool has_hands = !tools.empty();
   const auto first = slots_.begin() + (has_hands ? 0 : kMaxHands);
-  const int places = has_hands ? places_.hands : places_.watchers;
+  const int kept = role == Role::Observer ? kept_for_instructors(places_.watchers) : 0;
+  const int places = has_hands ? places_.hands : places_.watchers - kept;
   const auto last = first + places;
   const auto free = std::find_if(first, last, [](const auto& slot) { return !slot; });
   if (free == last)
