@@ -71,9 +71,9 @@ class McapReader {
   // reported and skipped, the others are still read.
   ReadReport read(const ChannelFilter& filter, const TimeRange& range,
                   const MessageVisitor& visitor);
-  // Compares the file's bytes with the CRC of its data section, which also covers what read() does not
-  // need: indexes, metadata, records outside chunks. Ok if there is none: the file has no end, or its
-  // writer gave no CRC. Reads the whole file.
+  // Compares the file's bytes with the CRC of its data section, which also covers what read() does
+  // not need: indexes, metadata, records outside chunks. Ok if there is none: the file has no end,
+  // or its writer gave no CRC. Reads the whole file.
   Status check_data_crc() const;
   // The last message on `topic` at or before `time`. Nothing if there is none; an error if the
   // chunk that should hold it is damaged.
