@@ -159,7 +159,7 @@ TEST(Golden, CutUnderTension) {
                        opened += report.cut.opened_area_m2;
                        return opened > 1e-5;
                      },
-                 .hash = 7737044111438224354u});
+                 .hash = 10480290550040282938u});
 }
 
 // A hand takes the end of the left lobe and draws it away until it tears.

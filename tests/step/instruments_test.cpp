@@ -88,7 +88,7 @@ TEST_F(Instruments, ScissorsCutWhatIsBetweenTheirBladesAndNoMore) {
     if (i % 20 == 0) hold(0.02f, tool::Verb::Cut, 0.02f);
     tick();
   }
-  EXPECT_GT(opened_m2_, before + 0.3 * between_m2);
+  EXPECT_GT(opened_m2_, before + 0.2 * between_m2);
   expect_sound();
 }
 

@@ -21,6 +21,12 @@ BladeEdge edge_of(std::span<const Vec3d> points) {
   return edge;
 }
 
+Vec3d mean_motion(const BladeEdge& from, const BladeEdge& to) {
+  Vec3d sum;
+  for (std::uint32_t i = 0; i < to.count; ++i) sum += to.points[i] - from.points[i];
+  return sum / to.count;
+}
+
 }  // namespace
 
 BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
@@ -37,8 +43,11 @@ BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
   now_ = edge;
   ticks_ = std::min(ticks_ + 1, settings.collect_ticks);
   const double motion = longest_motion(anchor_, now_);
+  // Where it turns to is known once it has gone a little.
+  const bool is_turning = dot(mean_motion(anchor_, now_), heading_) < 0;
   const bool is_due = motion > settings.collect_h * h ||
-                      (ticks_ == settings.collect_ticks && motion > settings.least_turn_h * h);
+                      (ticks_ == settings.collect_ticks &&
+                       motion > (is_turning ? settings.least_turn_h : kRest_h) * h);
   // A blade too far ahead of the cutting goes on collecting.
   if (is_due && strips() < settings.most_pieces_of_motion) add_strips(h, settings);
   return Verdict::Accepted;
@@ -58,6 +67,7 @@ void BladeMotion::add_strips(double h, const Settings& settings) {
         {between(anchor_, now_, i / pieces), between(anchor_, now_, (i + 1) / pieces), is_first_});
     is_first_ = false;
   }
+  heading_ = mean_motion(anchor_, now_);
   anchor_ = now_;
   ticks_ = 0;
 }
@@ -72,6 +82,7 @@ void BladeMotion::clear() {
   strips_.clear();
   next_ = 0;
   anchor_.count = now_.count = 0;
+  heading_ = {};
   ticks_ = 0;
   is_first_ = true;
 }

@@ -40,6 +40,7 @@ class BladeMotion {
   void visit_strips(world::StateArchive& archive);
 
   BladeEdge anchor_, now_;   // where collecting began; the last place
+  Vec3d heading_;            // m, the mean motion before; zero: there was none
   std::uint32_t ticks_ = 0;  // since then; counts no further than is asked
   bool is_first_ = true;
   std::vector<Strip> strips_;

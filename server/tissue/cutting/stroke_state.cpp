@@ -74,6 +74,8 @@ void BladeMotion::visit_state(world::StateArchive& archive, bool has_left) {
   if (has_left) return;
   visit_points(archive, anchor_, count);
   visit_points(archive, now_, count);
+  archive.value(heading_);
+  if (archive.is_reading() && !is_place(heading_)) archive.fail();
   archive.value(ticks_);
   archive.flag(is_first_);
   if (archive.is_reading() && (!is_blade(anchor_.span()) || !is_blade(now_.span()))) archive.fail();
