@@ -87,7 +87,7 @@ constexpr bool has_tools(Role role) {
 }
 // "unknown role" if it is none of kRoles.
 const char* name_of(Role role);
-// "a surgeon", "an observer".
+// Returns "a surgeon", "an observer".
 std::string one_of(Role role);
 // From the wire; Unknown if it is none of kRoles.
 Role role_of(int number);

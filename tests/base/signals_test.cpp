@@ -35,7 +35,7 @@ TEST(Signals, WritingWhereNobodyReadsIsAnErrorAlone) {
   ::signal(SIGPIPE, before);
 }
 
-// What the child does with the second signal, and with the third after its time is over.
+// The child does this with the second signal, and with the third after its time is over.
 int exit_of_ended_thrice(unsigned seconds) {
   const pid_t child = ::fork();
   if (child == 0) {

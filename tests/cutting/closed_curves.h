@@ -29,8 +29,8 @@ struct ClosedCurve {
   double inside_m2 = 0;    // the area that the curve surrounds in the block
 };
 
-// Of a block of this half side (m) with edges of mean length h (m). The blade is along z, tilted by
-// up to 10 degrees.
+// Draws in a block of this half side (m) with edges of mean length h (m). The blade is along z,
+// tilted by up to 10 degrees.
 ClosedCurve random_curve(CurveKind kind, double half_m, double h, trocar::testing::Random& random);
 
 // Draws it. Returns what is wrong, or nothing.

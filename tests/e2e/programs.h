@@ -21,7 +21,8 @@ std::string read_text(const std::filesystem::path& file);
 std::string json_value(const std::string& json, const std::string& key);
 double json_number(const std::string& json, const std::string& key);
 bool wait_for_file(const std::filesystem::path& file, double seconds);
-// Asks every 20 ms, or less often if asking takes long; false if the answer is still no after `seconds`.
+// Asks every 20 ms, or less often if asking takes long; false if the answer is still no after
+// `seconds`.
 bool wait_until(const std::function<bool()>& condition, double seconds);
 
 // A role's join code and link, as a server has printed them into its log.

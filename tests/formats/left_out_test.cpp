@@ -1,5 +1,5 @@
-// What a file says twice, otherwise than its neighbours do, or beside its mesh is taken, or a line
-// says that it is not.
+// All that a file says twice, otherwise than its neighbours do, or beside its mesh is taken, or a
+// line says that it is not.
 
 #include <gtest/gtest.h>
 

@@ -422,7 +422,7 @@ TEST_F(ServerProcess, a_limit_of_file_sizes_ends_the_recording_and_nothing_else)
     state = message->recording_state();
   }
   EXPECT_NE(state.text().find("File too large"), std::string::npos) << state.text();
-  EXPECT_TRUE(client.follow()) << "the session goes on";
+  EXPECT_TRUE(client.receive(proto::Envelope::kSurfaceFrame)) << "the session goes on";
   ::kill(pid_, SIGTERM);
   while (client.receive()) {
   }

@@ -42,7 +42,7 @@ bool starts_as_dicom(const fs::path& path) {
   return file.read(begin, sizeof begin) && std::string_view(begin + 128, 4) == "DICM";
 }
 
-// Which bits of a stored pixel are its value, and whether it can be below 0.
+// Says which bits of a stored pixel are its value, and whether it can be below 0.
 struct PixelBits {
   int allocated = 8, stored = 8, shift = 0;
   bool is_signed = false;
@@ -258,7 +258,8 @@ class SegmentationReader {
     return {};
   }
 
-  // What stands in the groups of a frame, or else in those that all frames share; null: in neither.
+  // Returns what stands in the groups of a frame, or else in those that all frames share; null: in
+  // neither.
   DcmItem* group(DcmItem& frame, const DcmTagKey& key) {
     if (auto* own = only_item(frame, key)) return own;
     auto* shared = only_item(reader_.data(), DCM_SharedFunctionalGroupsSequence);

@@ -74,7 +74,7 @@ struct MaterialRegion {
   std::string name;
   Material material;
   std::vector<NodeIndex> nodes;  // ascending, distinct
-  // Of its nodes' tets those that are in it, likewise; empty: all whose four nodes are in it.
+  // The tets that are in it, likewise; empty: all whose four nodes are in it.
   std::vector<TetIndex> tets;
 
   bool operator==(const MaterialRegion&) const = default;

@@ -20,7 +20,7 @@ struct Arrival {
   std::size_t bytes = 0;
 };
 
-// Of a socket that is open, before it is bound. False: the system does not tell addresses.
+// Asks it of a socket that is open, before it is bound. False: the system does not tell addresses.
 bool ask_for_local_addresses(asio::ip::udp::socket& socket);
 // None: nothing more is there. Does not block.
 std::optional<Arrival> receive_datagram(asio::ip::udp::socket& socket,

@@ -70,7 +70,7 @@ journal::McapMetadata without_files(journal::McapMetadata metadata) {
   return metadata;
 }
 
-// What stands between two words of a sentence, such as a name that no list holds.
+// This stands between two words of a sentence, such as a name that no list holds.
 std::string between(const std::string& text, std::string_view before, std::string_view after) {
   const auto begin = text.find(before);
   if (begin == std::string::npos) return {};
@@ -78,8 +78,8 @@ std::string between(const std::string& text, std::string_view before, std::strin
   return text.substr(from, text.rfind(after) - from);
 }
 
-// Where words that people typed begin in such an event's line; npos: there are none. Names in it
-// are pseudonyms already.
+// Returns where words that people typed begin in such an event's line; npos: there are none. Names
+// in it are pseudonyms already.
 std::size_t begin_of_words(const proto::TeachEvent& event, const std::string& text) {
   switch (event.action()) {
     case proto::TEACH_CHAT:

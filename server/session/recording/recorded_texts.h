@@ -1,7 +1,8 @@
 #pragma once
 
-// What the texts of a recording say of people, field by field of the schema. A test fails where a
-// field of a recorded message is not in the table, and such a field counts as personal.
+// The table says what the texts of a recording say of people, field by field of the schema. A test
+// fails where a field of a recorded message is not in the table, and such a field counts as
+// personal.
 
 #include <cstdint>
 #include <string_view>

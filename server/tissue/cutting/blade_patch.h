@@ -65,7 +65,7 @@ using Sides = std::array<Side, kMaxEdgePoints - 1>;  // of the last strip, by se
 void make_patch(const Strip& strip, double extension, double least_turn, Sides& sides,
                 std::vector<PatchTriangle>& out);
 
-// What a strip is near a place.
+// This is what a strip is near a place.
 struct NearestPart {
   double distance_squared = 0;  // m^2
   double height = 0;            // m, to the positive side

@@ -28,7 +28,7 @@ bool SideCut::can_label(const CutMesh& mesh, const Stroke& stroke, NodeIndex nod
   });
 }
 
-// What it costs to open a face, per area.
+// Returns what it costs to open a face, per area.
 double SideCut::cost_of(const CutMesh& mesh, const Stroke& stroke,
                         const mesh::Triangle& nodes) const {
   double cost = 1;

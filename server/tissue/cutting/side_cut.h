@@ -1,13 +1,14 @@
 #pragma once
 
-// Where a stroke meets a wound that is there already, or itself, some tets lie on the path's one
-// side and hang on the other side's tissue: signs of heights alone leave a bridge. So when a stroke
-// is over, the sides of all tets at its wound are decided together: as the least cut (Ford and
-// Fulkerson 1956) between what is clearly above the path and what is clearly below it. A face whose
-// nodes are all on the wound costs its area, any other a thousand times that, since it cannot be
-// opened; and a tet that changes sides costs a little. Cost: O(faces of the wound that are still
-// closed, times tets at labelled nodes). A node of an old wound's rim that is near the path, too,
-// is labelled where the cut goes through it: two wounds that run side by side are led together.
+// SideCut decides sides where a stroke meets a wound that is there already, or itself. Some tets
+// lie there on the path's one side and hang on the other side's tissue: signs of heights alone
+// leave a bridge. So when a stroke is over, the sides of all tets at its wound are decided
+// together: as the least cut (Ford and Fulkerson 1956) between what is clearly above the path and
+// what is clearly below it. A face whose nodes are all on the wound costs its area, any other a
+// thousand times that, since it cannot be opened; and a tet that changes sides costs a little.
+// Cost: O(faces of the wound that are still closed, times tets at labelled nodes). A node of an old
+// wound's rim that is near the path, too, is labelled where the cut goes through it: two wounds
+// that run side by side are led together.
 
 #include "server/tissue/cutting/opening.h"
 

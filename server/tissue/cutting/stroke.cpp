@@ -43,7 +43,7 @@ BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
   now_ = edge;
   ticks_ = std::min(ticks_ + 1, settings.collect_ticks);
   const double motion = longest_motion(anchor_, now_);
-  // Where it turns to is known once it has gone a little.
+  // A blade that turns has to go a little before it is known where to.
   const bool is_turning = dot(mean_motion(anchor_, now_), heading_) < 0;
   const bool is_due = motion > settings.collect_h * h ||
                       (ticks_ == settings.collect_ticks &&

@@ -64,7 +64,7 @@ class Hyperelastic final : public Energy {
   };
   static constexpr double kLeastVolume = 0.2;
   struct RowShape;
-  // Of a row: its stiffness against its volume, Pa/m^3, and what presses on it, Pa.
+  // A row has this stiffness against its volume, Pa/m^3, and this pressure, Pa.
   struct Volumetric {
     Float8 stiffness, pressure;
   };
