@@ -357,7 +357,7 @@ TEST(Access, a_class_that_joins_at_once_from_one_address_gets_in) {
   for (int i = 0; i < 24; ++i) {
     auto options = options_for(guarded.session->port(), "Trainee " + std::to_string(i),
                                Role::Observer, guarded.code(Role::Observer));
-    options.connect_deadline = std::chrono::milliseconds(15'000);
+    options.connect_deadline = std::chrono::milliseconds(60'000);
     options.connect_retry = std::chrono::milliseconds(50);
     trainees.push_back(std::make_unique<net::NetSource>(options));
   }
