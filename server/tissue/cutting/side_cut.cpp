@@ -58,25 +58,35 @@ void SideCut::add_arc(std::uint32_t a, std::uint32_t b, Capacity there, Capacity
   arcs_of_[b].push_back(first + 1);
 }
 
+// Its place in tets_, or kNone.
+std::uint32_t SideCut::place_of(TetIndex t) const {
+  const auto at = std::lower_bound(tets_.begin(), tets_.end(), t);
+  return at != tets_.end() && *at == t ? static_cast<std::uint32_t>(at - tets_.begin()) : kNone;
+}
+
+bool SideCut::is_clear(const CutMesh& mesh, const Stroke& stroke, TetIndex t) {
+  bool is_above = true, is_below = true, is_flat = true;
+  for (const auto node : mesh.topology().tet(t)) {
+    if (stroke.is_labelled(node)) continue;
+    is_flat = false;
+    const double height = stroke.height(node).height, clear = kClear_h * mesh.h(node);
+    is_above &= height > clear;
+    is_below &= height < -clear;
+  }
+  return !is_flat && (is_above || is_below);
+}
+
 void SideCut::connect(const CutMesh& mesh, Stroke& stroke, Opening& opening) {
   const auto& topology = mesh.topology();
   arcs_.clear();
+  led_.clear();
   for (auto& arcs : arcs_of_) arcs.clear();
   if (arcs_of_.size() < tets_.size() + 2) arcs_of_.resize(tets_.size() + 2);
   sides_.resize(tets_.size());
   for (std::uint32_t i = 0; i < tets_.size(); ++i) {
     const auto t = tets_[i];
     sides_[i] = static_cast<std::int8_t>(opening.side(mesh, stroke, t));
-    bool is_above = true, is_below = true, is_flat = true;
-    for (const auto node : topology.tet(t)) {
-      if (stroke.is_labelled(node)) continue;
-      is_flat = false;
-      const double height = stroke.height(node).height, clear = kClear_h * mesh.h(node);
-      is_above &= height > clear;
-      is_below &= height < -clear;
-    }
-    const bool is_clear = !is_flat && (is_above || is_below);
-    const auto weight = is_clear ? kWithoutEnd : kPerTet;
+    const auto weight = is_clear(mesh, stroke, t) ? kWithoutEnd : kPerTet;
     if (sides_[i] > 0)
       add_arc(kAbove, i + 2, weight, 0);
     else
@@ -84,66 +94,74 @@ void SideCut::connect(const CutMesh& mesh, Stroke& stroke, Opening& opening) {
     for (std::uint8_t corner = 0; corner < 4; ++corner) {
       const auto other = across(topology, {t, corner});
       if (!other || other->tet < t) continue;
-      const auto at = std::lower_bound(tets_.begin(), tets_.end(), other->tet);
-      if (at == tets_.end() || *at != other->tet) continue;
+      const auto k = place_of(other->tet);
+      if (k == kNone) continue;
       const auto nodes = face_nodes(topology.tet(t), corner);
+      const double per_area = cost_of(mesh, stroke, nodes);
       const double area = face_area(topology, {t, corner}) / (stroke.h * stroke.h);
-      const auto cost = 1 + static_cast<Capacity>(area * kPerArea * cost_of(mesh, stroke, nodes));
-      add_arc(i + 2, static_cast<std::uint32_t>(at - tets_.begin()) + 2, cost, cost);
+      const auto cost = 1 + static_cast<Capacity>(area * kPerArea * per_area);
+      add_arc(i + 2, k + 2, cost, cost);
+      if (per_area == kPerOldWound) led_.push_back({i, k, nodes});
     }
   }
 }
 
-// The shortest that is left.
-bool SideCut::find_way() {
-  came_by_.assign(tets_.size() + 2, kNone);
+// Distances from what is above, over arcs with something left; whether they reach what is below.
+bool SideCut::find_distances() {
+  distances_.assign(tets_.size() + 2, kNone);
+  distances_[kAbove] = 0;
   queue_.assign(1, kAbove);
   for (std::size_t i = 0; i < queue_.size(); ++i)
     for (const auto a : arcs_of_[queue_[i]]) {
       const auto to = arcs_[a].to;
-      if (arcs_[a].left == 0 || to == kAbove || came_by_[to] != kNone) continue;
-      came_by_[to] = a;
-      if (to == kBelow) return true;
+      if (arcs_[a].left == 0 || distances_[to] != kNone) continue;
+      distances_[to] = distances_[queue_[i]] + 1;
       queue_.push_back(to);
     }
-  return false;
+  return distances_[kBelow] != kNone;
 }
 
-void SideCut::fill_way() {
-  const auto from = [&](std::uint32_t a) { return arcs_[arcs_[a].back].to; };
-  auto least = kWithoutEnd;
-  for (auto n = kBelow; n != kAbove; n = from(came_by_[n]))
-    least = std::min(least, arcs_[came_by_[n]].left);
-  for (auto n = kBelow; n != kAbove; n = from(came_by_[n])) {
-    arcs_[came_by_[n]].left -= least;
-    arcs_[arcs_[came_by_[n]].back].left += least;
+// Fills one shortest way; false: none is left.
+bool SideCut::fill_way() {
+  way_.clear();
+  for (auto n = kAbove; n != kBelow;) {
+    auto& next = next_arc_[n];
+    const auto& arcs = arcs_of_[n];
+    while (next < arcs.size() &&
+           (arcs_[arcs[next]].left == 0 || distances_[arcs_[arcs[next]].to] != distances_[n] + 1))
+      ++next;
+    if (next < arcs.size()) {
+      way_.push_back(arcs[next]);
+      n = arcs_[way_.back()].to;
+    } else if (way_.empty()) {
+      return false;
+    } else {  // a dead end
+      n = arcs_[arcs_[way_.back()].back].to;
+      ++next_arc_[n];
+      way_.pop_back();
+    }
   }
+  auto least = kWithoutEnd;
+  for (const auto a : way_) least = std::min(least, arcs_[a].left);
+  for (const auto a : way_) {
+    arcs_[a].left -= least;
+    arcs_[arcs_[a].back].left += least;
+  }
+  return true;
 }
 
 // Labels what the cut goes through. Tets there keep the sides that they have.
 void SideCut::label(const CutMesh& mesh, Stroke& stroke, Opening& opening) {
-  const auto& topology = mesh.topology();
   nodes_.clear();
-  for (std::uint32_t i = 0; i < tets_.size(); ++i)
-    for (std::uint8_t corner = 0; corner < 4; ++corner) {
-      const auto other = across(topology, {tets_[i], corner});
-      if (!other || other->tet < tets_[i]) continue;
-      const auto at = std::lower_bound(tets_.begin(), tets_.end(), other->tet);
-      if (at == tets_.end() || *at != other->tet) continue;
-      if (sides_[i] == sides_[static_cast<std::size_t>(at - tets_.begin())]) continue;
-      const auto nodes = face_nodes(topology.tet(tets_[i]), corner);
-      if (cost_of(mesh, stroke, nodes) != kPerOldWound) continue;
-      for (const auto node : nodes)
-        if (!stroke.is_labelled(node)) nodes_.push_back(node);
-    }
+  for (const auto& [a, b, nodes] : led_)
+    for (const auto node : nodes)
+      if (sides_[a] != sides_[b] && !stroke.is_labelled(node)) nodes_.push_back(node);
   std::sort(nodes_.begin(), nodes_.end());
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
   for (const auto node : nodes_)
-    for (const auto t : topology.tets_of(node)) {
-      const auto at = std::lower_bound(tets_.begin(), tets_.end(), t);
-      const bool is_known = at != tets_.end() && *at == t;
-      stroke.decide(t, is_known ? sides_[static_cast<std::size_t>(at - tets_.begin())]
-                                : opening.side(mesh, stroke, t));
+    for (const auto t : mesh.topology().tets_of(node)) {
+      const auto i = place_of(t);
+      stroke.decide(t, i != kNone ? sides_[i] : opening.side(mesh, stroke, t));
     }
   for (const auto node : nodes_) stroke.label(node);
 }
@@ -151,10 +169,14 @@ void SideCut::label(const CutMesh& mesh, Stroke& stroke, Opening& opening) {
 bool SideCut::run(CutMesh& mesh, Stroke& stroke, Opening& opening) {
   gather(mesh, stroke);
   connect(mesh, stroke, opening);
-  while (find_way()) fill_way();
+  while (find_distances()) {
+    next_arc_.assign(tets_.size() + 2, 0);
+    while (fill_way()) {
+    }
+  }
   bool has_changed = false;
   for (std::uint32_t i = 0; i < tets_.size(); ++i) {
-    const std::int8_t side = came_by_[i + 2] != kNone ? 1 : -1;
+    const std::int8_t side = distances_[i + 2] != kNone ? 1 : -1;
     if (side == sides_[i]) continue;
     has_changed = true;
     sides_[i] = side;

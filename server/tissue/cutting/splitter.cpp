@@ -54,7 +54,7 @@ void Splitter::find_near(CutMesh& mesh, std::span<const PatchTriangle> patch) {
 }
 
 // Heights above what the blade has really swept: where it turns, the patch runs on past the corner.
-// What was nearest to the end of the last strip is now nearest to the joint.
+// A node that was nearest to the end of the last strip is now nearest to the joint.
 void Splitter::measure(Stroke& stroke) const {
   for (std::size_t i = 0; i < near_.size(); ++i) {
     if (stroke.is_labelled(near_[i])) continue;
