@@ -3,6 +3,7 @@
 // Principal values and directions of symmetric matrices, by Jacobi's rotations. Square roots only,
 // so the same bits everywhere that decisions are made from them.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -15,8 +16,8 @@ struct Principal {
   Vec3d direction;  // of length 1
 };
 
-// The largest principal value. Relative error below 1e-12 for finite matrices.
-inline Principal largest_principal(const SymMat3<double>& matrix) {
+// All three, in no order. Relative error below 1e-12 of the largest for finite matrices.
+inline std::array<Principal, 3> principals_of(const SymMat3<double>& matrix) {
   std::array<std::array<double, 3>, 3> a{{{matrix.xx, matrix.xy, matrix.xz},
                                           {matrix.xy, matrix.yy, matrix.yz},
                                           {matrix.xz, matrix.yz, matrix.zz}}};
@@ -44,10 +45,23 @@ inline Principal largest_principal(const SymMat3<double>& matrix) {
           v[k][q] = s * kp + c * kq;
         }
       }
-  std::size_t largest = 0;
-  for (std::size_t i = 1; i < 3; ++i)
-    if (a[i][i] > a[largest][largest]) largest = i;
-  return {a[largest][largest], {v[0][largest], v[1][largest], v[2][largest]}};
+  const auto principal = [&](std::size_t i) {
+    return Principal{a[i][i], {v[0][i], v[1][i], v[2][i]}};
+  };
+  return {principal(0), principal(1), principal(2)};
+}
+
+inline Principal largest_principal(const SymMat3<double>& matrix) {
+  const auto principals = principals_of(matrix);
+  return *std::ranges::max_element(principals, {}, &Principal::value);
+}
+
+// The nearest matrix without negative principal values.
+inline SymMat3<double> positive_part(const SymMat3<double>& matrix) {
+  SymMat3<double> sum;
+  for (const auto& principal : principals_of(matrix))
+    sum.add_outer(principal.direction, std::max(0.0, principal.value));
+  return sum;
 }
 
 }  // namespace trocar

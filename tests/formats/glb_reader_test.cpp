@@ -282,7 +282,7 @@ TEST(GlbReader, WhatIsNoTriangleInRestIsLeftOutAndSaid) {
   Glb glb;
   glb.json["meshes"][0]["weights"] = {0, 0.0};
   glb.json["meshes"][0]["primitives"][1]["mode"] = 1;
-  glb.json["animations"] = {Json::object()};
+  glb.json["animations"] = Json::array({Json::object()});
   glb.json["scenes"].push_back(Json::object());
   const auto surface = parse_glb(glb.file(), "a.glb");
   ASSERT_TRUE(surface.ok()) << surface.error().message;

@@ -1,5 +1,7 @@
 #include "server/tissue/touch/stiffness_fit.h"
 
+#include "common/math/symmetric.h"
+
 namespace trocar::touch {
 namespace {
 
@@ -38,12 +40,16 @@ SymMat3f StiffnessFit::stiffness(const SymMat3f& guess) const {
     const auto row = static_cast<std::size_t>(i);
     k[row] = solve_positive_definite(moved, rows_[row] + column(guess, i) * kNoise);
   }
-  return {.xx = k[0].x,
-          .xy = 0.5f * (k[0].y + k[1].x),
-          .xz = 0.5f * (k[0].z + k[2].x),
-          .yy = k[1].y,
-          .yz = 0.5f * (k[1].z + k[2].y),
-          .zz = k[2].z};
+  const auto across = [&](double a, double b) { return 0.5 * (a + b); };
+  const auto positive = positive_part({.xx = double(k[0].x),
+                                       .xy = across(double(k[0].y), double(k[1].x)),
+                                       .xz = across(double(k[0].z), double(k[2].x)),
+                                       .yy = double(k[1].y),
+                                       .yz = across(double(k[1].z), double(k[2].y)),
+                                       .zz = double(k[2].z)});
+  const auto f = [](double value) { return static_cast<float>(value); };
+  return {f(positive.xx), f(positive.xy), f(positive.xz),
+          f(positive.yy), f(positive.yz), f(positive.zz)};
 }
 
 }  // namespace trocar::touch

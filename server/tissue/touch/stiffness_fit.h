@@ -17,7 +17,8 @@ class StiffnessFit {
   void add(const Vec3f& at_m, const Vec3f& force_n);
   void clear() { *this = {}; }
 
-  // N/m, symmetric; where the tool has not moved, it is `guess`.
+  // N/m, symmetric; where the tool has not moved, it is `guess`. No direction of it is negative:
+  // a force that falls while the tool pulls on is of tissue that tears, and no spring pushes.
   SymMat3f stiffness(const SymMat3f& guess) const;
 
  private:

@@ -150,7 +150,11 @@ void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::Hapti
     touch.along_m = 0;
     surface.settle(scene.world, layout, place);
   } else if (!surface.is_known() || surface.has_changed(layout, place)) {
-    if (surface.is_known()) touch.structure = static_cast<std::uint32_t>(scene.world.tick);
+    if (surface.is_known()) {
+      touch.structure = static_cast<std::uint32_t>(scene.world.tick);
+      // What a blade feels is no spring, and each step of it is another surface.
+      if (touch.kind == TouchKind::Grip) touch.stiffness.clear();
+    }
     if (touch.kind == TouchKind::Cut) {
       surface.take_beside_wound(scene.world, layout, place);
     } else {
