@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Imports the files of a folder of cases from use, and checks what comes out of each.
+"""Imports the files of a folder of cases from use, cuts in its scenes, and checks what comes out of each.
 
     run_cases.py BIN SHARED
 
-BIN has trocar-organ; SHARED, or the folder of the variable TROCAR_SHARED, has cases with meshes, surfaces and scans.
+BIN has trocar-organ and trocar-sim; SHARED, or the folder of the variable TROCAR_SHARED, has cases with meshes,
+surfaces, scans and scenes of cutting.
 Exit code: 1 if a case comes out otherwise, 77 if they are not there.
 """
 
@@ -44,6 +45,20 @@ CASES = [
     ("scans/one-slice.nii.gz", "", 3, ["is one slice, 3 mm thick: it has no inside"], {}),
 ]
 
+# Scene, volumes of the parts at its end in ml (of 64 in all), least force in its probes in N.
+SCENES = [
+    ("cutting/wedge.toml", [5.24], 0),
+    ("cutting/square.toml", [8], 0),
+    ("cutting/four-corners.toml", [5.66], 0),
+    ("cutting/wedge-again.toml", [5.24], 0),
+    ("cutting/waiting-blade.toml", [], 1),
+]
+
+
+def six_volumes(p, q, r, s):
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = ([b - a for a, b in zip(p, o)] for o in (q, r, s))
+    return ax * (by * cz - bz * cy) - ay * (bx * cz - bz * cx) + az * (bx * cy - by * cx)
+
 
 def volumes_of(mesh):
     """Volumes in ml of the regions of a Gmsh file in mm."""
@@ -64,9 +79,7 @@ def volumes_of(mesh):
                 words = next(lines).split()
                 if words[1] != "4":
                     continue
-                a, *others = (nodes[n] for n in words[-4:])
-                (ax, ay, az), (bx, by, bz), (cx, cy, cz) = ([p - q for p, q in zip(o, a)] for o in others)
-                six = ax * (by * cz - bz * cy) - ay * (bx * cz - bz * cx) + az * (bx * cy - by * cx)
+                six = six_volumes(*(nodes[n] for n in words[-4:]))
                 name = names.get(words[3], words[3])
                 volumes[name] = volumes.get(name, 0) + six / 6 / 1000
     return volumes
@@ -98,6 +111,59 @@ def fault_of(program, cases, folder, case):
     return ""
 
 
+def array_of(text, name, kind):
+    found = re.search(rf'<DataArray[^>]*Name="{name}"[^>]*>(.*?)</DataArray>', text, re.S)
+    return [kind(word) for word in found.group(1).split()]
+
+
+def parts_of(field):
+    """Number of nodes, and volumes at rest in ml of what hangs together by faces, the largest last."""
+    text = field.read_text()
+    numbers = array_of(text, "rest_m", float)
+    nodes = [numbers[i:i + 3] for i in range(0, len(numbers), 3)]
+    numbers = array_of(text, "connectivity", int)
+    tets = [numbers[i:i + 4] for i in range(0, len(numbers), 4)]
+    parent = list(range(len(tets)))
+
+    def root(tet):
+        while parent[tet] != tet:
+            parent[tet] = parent[parent[tet]]
+            tet = parent[tet]
+        return tet
+
+    other = {}
+    for tet, corners in enumerate(tets):
+        for left_out in corners:
+            face = frozenset(corners) - {left_out}
+            parent[root(tet)] = root(other.setdefault(face, tet))
+    volumes = {}
+    for tet, corners in enumerate(tets):
+        ml = abs(six_volumes(*(nodes[n] for n in corners))) / 6 * 1e6
+        volumes[root(tet)] = volumes.get(root(tet), 0) + ml
+    return len(nodes), sorted(volumes.values())
+
+
+def fault_of_scene(program, cases, folder, scene):
+    """Empty, or what comes out otherwise."""
+    file, parts, least_n = scene
+    ended, text = run(program, cases / file, "--out", folder / "out")
+    if ended != 0:
+        return text.strip()
+    fields = sorted((folder / "out").glob("field_*.vtu"))
+    (before, _), (after, volumes) = parts_of(fields[0]), parts_of(fields[-1])
+    wanted = [*parts, 64 - sum(parts)]
+    if len(volumes) != len(wanted) or any(abs(v - w) > 0.01 * w for v, w in zip(volumes, wanted)):
+        return f"parts of {volumes} ml, must be {wanted}"
+    if after <= before:
+        return "nothing is cut"
+    if least_n > 0:
+        rows = [line.split(",") for line in (folder / "out" / "probes.csv").read_text().splitlines()[1:]]
+        most_n = max(sum(float(n) ** 2 for n in row[1:4]) ** 0.5 for row in rows)
+        if most_n < least_n:
+            return f"at most {most_n} N are felt, must be {least_n}"
+    return ""
+
+
 def main():
     binaries = pathlib.Path(sys.argv[1])
     cases = pathlib.Path(os.environ.get("TROCAR_SHARED", sys.argv[2])) / "cases"
@@ -110,7 +176,13 @@ def main():
             fault = fault_of(binaries / "trocar-organ", cases, pathlib.Path(folder), case)
         wrong += fault != ""
         print(f"{case[0]}: {fault or 'right'}")
-    print(f"{len(CASES) - wrong} of {len(CASES)} cases come out right")
+    for scene in SCENES:
+        with tempfile.TemporaryDirectory() as folder:
+            fault = fault_of_scene(binaries / "trocar-sim", cases, pathlib.Path(folder), scene)
+        wrong += fault != ""
+        print(f"{scene[0]}: {fault or 'right'}")
+    total = len(CASES) + len(SCENES)
+    print(f"{total - wrong} of {total} cases come out right")
     return 1 if wrong else 0
 
 

@@ -27,7 +27,7 @@ organ::Organ box(double jitter = 0.2) {
 }
 
 EdgeResistance look(CutOrgan& organ, const Vec3d& from, const Vec3d& to) {
-  return organ.cutter().resistance_of(organ.displacements, kUnknownTravel, from, to);
+  return organ.cutter().resistance_of(organ.displacements, {}, kUnknownTravel, from, to);
 }
 double friction(CutOrgan& organ, const Vec3d& from, const Vec3d& to) {
   return sum(look(organ, from, to).friction_n_m);
@@ -49,6 +49,66 @@ TEST(EdgeResistance, IsOfTheLengthInTissue) {
   expect(0.04 * 0.2, {0.021, -0.02, 0.004}, {0.021, 0.02, 0.004});
   expect(0, {0.0213, -0.05, 0.004}, {0.0213, 0.05, 0.004});
   expect(0, {0.003, 0.03, 0.004}, {0.003, 0.05, 0.004});
+}
+
+TEST(EdgeResistance, SaysHowTheTissueMoves) {
+  CutOrgan organ(box());
+  const Vec3d from{0.003, -0.03, 0.004}, to{0.003, 0.03, 0.004};
+  const auto velocity_at = [](const Vec3d& p) { return Vec3d{0.02 + 0.5 * p.y, 0.3 * p.x, 0}; };
+  std::vector<Vec3f> velocities;
+  for (const auto& rest : organ.topology().rest())
+    velocities.push_back(to_float(velocity_at(rest)));
+  const auto tissue_m_s =
+      organ.cutter().resistance_of({}, velocities, kUnknownTravel, from, to).tissue_m_s;
+  constexpr double kSlopeError = 0.02;
+  EXPECT_LT(length(tissue_m_s[0] - velocity_at(from)), kSlopeError * 0.5 * 0.03);
+  EXPECT_LT(length(tissue_m_s[1] - velocity_at(to)), kSlopeError * 0.5 * 0.03);
+  EXPECT_EQ(look(organ, from, to).tissue_m_s, (std::array<Vec3d, 2>{}));
+}
+
+// It is the motion of the edge in the tissue that cuts: a blade that is held still while the tissue
+// is drawn past it, and one that moves with the tissue.
+TEST(ABladeHeldStill, CutsWhatIsDrawnPastIt) {
+  const Edge edge{{-0.03, 0.003, -0.03}, {-0.03, 0.003, 0.03}};
+  constexpr int kTicks = 600;
+  constexpr double kStep_m = 1e-4;
+  CutOrgan moves(box()), stands(box());
+  const auto node_count = stands.topology().node_count();
+  for (int i = 0; i <= kTicks; ++i) {
+    const Vec3d way{i * kStep_m, 0, 0};
+    moves.cutter().move(0, Edge{edge[0] + way, edge[1] + way});
+    moves.tick();
+    stands.displacements.assign(stands.topology().node_count(), to_float(-way));
+    if (i > 0) stands.cutter().carry(0, {Vec3d{-kStep_m, 0, 0}, Vec3d{-kStep_m, 0, 0}});
+    stands.cutter().move(0, edge);
+    stands.tick();
+  }
+  for (auto* const organ : {&moves, &stands}) {
+    organ->cutter().lift(0);
+    organ->run_until_idle();
+    EXPECT_EQ(organ->check(), "");
+    EXPECT_NEAR(organ->total().opened_area_m2, 0.04 * 0.04, 0.04 * 0.04 * 0.1);
+    EXPECT_GT(organ->topology().node_count(), node_count);
+  }
+  EXPECT_NEAR(stands.total().opened_area_m2, moves.total().opened_area_m2,
+              0.01 * moves.total().opened_area_m2);
+}
+
+TEST(ABladeHeldStill, CutsNothingThatItMovesWith) {
+  CutOrgan organ(box());
+  const Edge edge{{-0.001, 0.003, -0.03}, {-0.001, 0.003, 0.03}};
+  const Vec3d step{1e-4, 0, 0};
+  for (int i = 0; i <= 100; ++i) {
+    const Vec3d way = step * i;
+    organ.displacements.assign(organ.topology().node_count(), to_float(way));
+    if (i > 0) organ.cutter().carry(0, {step, step});
+    organ.cutter().move(0, Edge{edge[0] + way, edge[1] + way});
+    organ.tick();
+  }
+  organ.cutter().lift(0);
+  organ.run_until_idle();
+  EXPECT_EQ(organ.total().splits, 0u);
+  EXPECT_EQ(organ.total().opened_area_m2, 0);
 }
 
 TEST(EdgeResistance, SaysWhichPartsMeetIt) {
@@ -143,7 +203,7 @@ TEST(EdgeResistance, RefusesWhatIsNoBladeAndForgetsNothing) {
   for (int i = 0; i < 200; ++i) {
     const Vec3d from{any(), any(), any()}, to{any(), any(), any()};
     const double first = friction(organ, from, to);
-    EXPECT_EQ(sum(organ.cutter().resistance_of({}, 0, from, to).friction_n_m), first);
+    EXPECT_EQ(sum(organ.cutter().resistance_of({}, {}, 0, from, to).friction_n_m), first);
     EXPECT_NEAR(friction(organ, to, from), first, kTau_pa * 1e-9);
     EXPECT_LE(first, kTau_pa * length(to - from) * (1 + 1e-12));
   }

@@ -159,7 +159,7 @@ TEST(Golden, CutUnderTension) {
                        opened += report.cut.opened_area_m2;
                        return opened > 1e-5;
                      },
-                 .hash = 10480290550040282938u});
+                 .hash = 11934926585747493283u});
 }
 
 // A hand takes the end of the left lobe and draws it away until it tears.

@@ -83,6 +83,8 @@ void EdgeForce::look(const cutting::EdgeResistance& resistance, double breadth_m
     part.next_grip_n =
         std::min(static_cast<float>(resistance.friction_n_m[i] * breadth_m), kMostForce_n);
   }
+  for (std::size_t end = 0; end < 2; ++end)
+    tissue_m_[end] = to_float(resistance.tissue_m_s[end]) * kTickSeconds;
   if (last_cut_n == 0 && cut_n > 0)
     whole_ = share_ = std::min(1.0f, static_cast<float>(resistance.whole_cut_n) / cut_n);
   steps_left_ = kLookEvery;
@@ -101,7 +103,7 @@ void EdgeForce::follow_look() {
 }
 
 Wrench EdgeForce::move(const EdgeEnds& ends, float opened_j, float h_m) {
-  const EdgeEnds moved{ends[0] - ends_[0], ends[1] - ends_[1]};
+  const EdgeEnds moved{ends[0] - ends_[0] - tissue_m_[0], ends[1] - ends_[1] - tissue_m_[1]};
   ends_ = ends;
   velocity_ += (moved[0] / kTickSeconds - velocity_) * kNewest;
   follow_look();
@@ -177,6 +179,7 @@ void EdgeForce::visit_state(world::StateArchive& archive) {
       number(*along, -kMostHeading, kMostHeading);
     vector(part.held);
   }
+  for (auto& end : tissue_m_) vector(end);
   archive.value(steps_left_);
   if (archive.is_reading() && steps_left_ > kLookEvery) archive.fail();
   number(owed_j_, -kMostOwed_j, kMostOwed_j);

@@ -22,6 +22,8 @@
 // so that it builds up, and turns, over h_u of way. A blade that stands loses it in a few tenths of
 // a second: who stands feels no cutting.
 //
+// Ways are in the tissue: where it moves, so much less, or more, of the edge's own (tissue_m).
+//
 // Friction. Tissue that lies against the sides holds each part by a spring from where it was, which
 // gives way where it would pull harder than the shear stress on the sides. So it is smooth at rest,
 // and never gives back more than was put into it: with s the spring's length and d the way of a
@@ -67,6 +69,8 @@ class EdgeForce {
   Wrench move(const EdgeEnds& ends, float opened_j, float h_m);
   // It does nothing, and what it owes is forgotten.
   void rest(const EdgeEnds& ends);
+  // Returns how far the tissue at either end of the edge moves in a tick, m.
+  const EdgeEnds& tissue_m() const { return tissue_m_; }
   // Returns with how much force a blade that goes on is held back by what it cuts here, N.
   float cutting_n() const;
   // Returns with how much friction holds it at most, N.
@@ -92,6 +96,7 @@ class EdgeForce {
   EdgeEnds ends_{};
   Vec3f velocity_;  // m/s, of the tip, smoothed
   std::array<Part, cutting::kEdgeParts> parts_{};
+  EdgeEnds tissue_m_{};          // in a tick, as it was last seen
   std::uint8_t steps_left_ = 0;  // until the parts are as they were last seen
   float owed_j_ = 0;             // O
   float whole_ = 1;              // w

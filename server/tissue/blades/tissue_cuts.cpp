@@ -53,6 +53,8 @@ std::optional<topology::Edit> TissueCuts::cut(const hands::ToolTable& tools,
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if ((lifted >> i & 1) != 0) cutter_->lift(i);
     if (!blades_[ToolSlot{i}].is_cutting) continue;
+    const auto& moved = blades_[ToolSlot{i}].edge.tissue_m();
+    cutter_->carry(i, {to_double(moved[0]), to_double(moved[1])});
     const auto edge = hands::edge_of(tools[ToolSlot{i}]);
     cutter_->move(i, std::array{to_double(edge[0]), to_double(edge[1])});
   }
@@ -82,8 +84,8 @@ void TissueCuts::look_at_edges(const hands::ToolTable& tools, const world::World
     const auto& shape = tools[slot].shape;
     const auto breadth = 2 * static_cast<double>(shape.radius_m + shape.half_width_m);
     const auto edge = hands::edge_of(tools[slot]);
-    auto resistance = cutter_->resistance_of(world.displacements, travel_m, to_double(edge[0]),
-                                             to_double(edge[1]));
+    auto resistance = cutter_->resistance_of(world.displacements, world.velocities, travel_m,
+                                             to_double(edge[0]), to_double(edge[1]));
     for (auto& cut_n : resistance.cut_n) cut_n *= static_cast<double>(hands_share(shape.form));
     resistance.whole_cut_n *= static_cast<double>(hands_share(shape.form));
     blades_.look(slot, resistance, 2 * breadth);

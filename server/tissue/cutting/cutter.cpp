@@ -58,6 +58,11 @@ void Cutter::lift(std::uint32_t blade) {
   stroke_of_[blade] = kNone;
 }
 
+void Cutter::carry(std::uint32_t blade, const std::array<Vec3d, 2>& moved) {
+  if (blade < kMaxBlades && stroke_of_[blade] != kNone)
+    strokes_[stroke_of_[blade]].motion.carry(moved);
+}
+
 bool Cutter::is_idle() const {
   return torn_.empty() && std::ranges::none_of(strokes_, [](const Stroke& stroke) {
            return stroke.is_active && (stroke.has_ended || stroke.motion.has_strip());
@@ -196,10 +201,11 @@ void Cutter::let_others_go_first(std::span<const std::uint32_t> places) {
     if (strokes_[s].is_active) strokes_[s].id = next_id_++;
 }
 
-EdgeResistance Cutter::resistance_of(std::span<const Vec3f> displacements, double travel_m,
+EdgeResistance Cutter::resistance_of(std::span<const Vec3f> displacements,
+                                     std::span<const Vec3f> velocities, double travel_m,
                                      const Vec3d& from, const Vec3d& to) {
   mesh_.begin(displacements, travel_m, unchanged_);
-  const auto resistance = meter_.measure(mesh_, from, to);
+  const auto resistance = meter_.measure(mesh_, velocities, from, to);
   mesh_.end();
   return resistance;
 }

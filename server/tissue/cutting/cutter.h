@@ -40,6 +40,9 @@ class Cutter {
   // are refused; the stroke, if there is one, then waits where it was.
   bool move(std::uint32_t blade, std::span<const Vec3d> edge);
   void lift(std::uint32_t blade);
+  // The tissue about a blade's edge has moved so far, m, at either end: what the blade has still to
+  // cut moves with it.
+  void carry(std::uint32_t blade, const std::array<Vec3d, 2>& moved);
 
   // Sets the inner faces, each from the side of the lower tet, ascending, that cut() opens first.
   void tear(std::span<const TetFace> faces) { torn_.assign(faces.begin(), faces.end()); }
@@ -50,8 +53,9 @@ class Cutter {
   void cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m = kUnknownTravel);
 
   // Measures a line in tissue as it is now. Displacements and travel are as for cut(), which it may
-  // precede.
-  EdgeResistance resistance_of(std::span<const Vec3f> displacements, double travel_m,
+  // precede; velocities are as for EdgeMeter.
+  EdgeResistance resistance_of(std::span<const Vec3f> displacements,
+                               std::span<const Vec3f> velocities, double travel_m,
                                const Vec3d& from, const Vec3d& to);
 
   // Does what another cutter did to the same topology: all its events, of all its calls, in order;

@@ -87,6 +87,20 @@ double distance_to(const std::array<Vec3d, 4>& corners, const std::array<PlaneOf
   return is_inside ? 0 : std::sqrt(nearest_squared);
 }
 
+// The place's barycentric coordinates, or those of a place of the tet near it.
+std::array<double, 4> weights_at(const std::array<Vec3d, 4>& corners,
+                                 const std::array<PlaneOfFace, 4>& planes, const Vec3d& p) {
+  std::array<double, 4> weights;
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double height = -planes[i].height(corners[i]);
+    weights[i] = height > 0 ? std::clamp(-planes[i].height(p) / height, 0.0, 1.0) : 0;
+    sum += weights[i];
+  }
+  for (auto& weight : weights) weight = sum > 0 ? weight / sum : 0.25;
+  return weights;
+}
+
 }  // namespace
 
 void EdgeMeter::find_tets(CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
@@ -137,11 +151,51 @@ void EdgeMeter::meet(const std::array<Vec3d, 4>& corners, TetIndex tet, const Ve
     auto& sample = samples_[static_cast<std::size_t>(i)];
     if (sample.nearness == 1) continue;
     const double nearness = 1 - distance_to(corners, planes, place) / kNear_m;
-    if (nearness > sample.nearness) sample = {nearness, tet};
+    if (nearness > sample.nearness) sample = {nearness, tet, weights_at(corners, planes, place)};
   }
 }
 
-EdgeResistance EdgeMeter::measure(CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
+// A weighted linear fit; where little of the edge is in tissue, rather the mean.
+std::array<Vec3d, 2> EdgeMeter::tissue_motion(const topology::Topology& topology,
+                                              std::span<const Vec3f> velocities) const {
+  if (velocities.empty()) return {};
+  // Of the edge's length, squared: what lies in less than about a tenth tells no slope.
+  constexpr double kLeastSpread = 5e-4;
+  const auto velocity_of = [&](const Sample& sample) {
+    Vec3d velocity;
+    const auto& nodes = topology.tet(sample.tet);
+    for (std::size_t k = 0; k < 4; ++k)
+      velocity += to_double(velocities[nodes[k].value]) * sample.weights[k];
+    return velocity;
+  };
+  const auto place_of = [&](std::size_t i) {
+    return (static_cast<double>(i) + 0.5) / static_cast<double>(samples_.size());
+  };
+  double weight = 0, place = 0;
+  Vec3d velocity;
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    if (!(samples_[i].nearness > 0)) continue;
+    weight += samples_[i].nearness;
+    place += samples_[i].nearness * place_of(i);
+    velocity += velocity_of(samples_[i]) * samples_[i].nearness;
+  }
+  if (!(weight > 0)) return {};
+  place /= weight;
+  velocity = velocity / weight;
+  double spread = kLeastSpread * weight;
+  Vec3d slope;
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    if (!(samples_[i].nearness > 0)) continue;
+    const double aside = place_of(i) - place;
+    spread += samples_[i].nearness * aside * aside;
+    slope += (velocity_of(samples_[i]) - velocity) * (samples_[i].nearness * aside);
+  }
+  slope = slope / spread;
+  return {velocity - slope * place, velocity + slope * (1 - place)};
+}
+
+EdgeResistance EdgeMeter::measure(CutMesh& mesh, std::span<const Vec3f> velocities,
+                                  const Vec3d& from, const Vec3d& to) {
   EdgeResistance sums;
   if (!is_blade(std::array{from, to})) return sums;
   find_tets(mesh, from, to);
@@ -151,7 +205,7 @@ EdgeResistance EdgeMeter::measure(CutMesh& mesh, const Vec3d& from, const Vec3d&
   for (const auto tet : tets_) meet(corners_of(mesh, tet), tet, from, to);
   const double length_of_sample = length(to - from) / static_cast<double>(samples_.size());
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    const auto& [nearness, tet] = samples_[i];
+    const auto& [nearness, tet, _] = samples_[i];
     if (!(nearness > 0)) continue;
     const auto& material = organ::material_at(topology.organ(), topology.material_of(tet));
     const double met_m = nearness * length_of_sample;
@@ -159,6 +213,7 @@ EdgeResistance EdgeMeter::measure(CutMesh& mesh, const Vec3d& from, const Vec3d&
     sums.cut_n[i / kEdgeSamples] += met_m * material.cut_energy_j_m2;
     if (topology.wound_faces(tet) == 0) sums.whole_cut_n += met_m * material.cut_energy_j_m2;
   }
+  sums.tissue_m_s = tissue_motion(topology, velocities);
   return sums;
 }
 

@@ -53,6 +53,18 @@ BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
   return Verdict::Accepted;
 }
 
+void BladeMotion::carry(const std::array<Vec3d, 2>& moved) {
+  const auto carry_edge = [&](BladeEdge& edge) {
+    for (std::uint32_t i = 0; i < edge.count; ++i)
+      edge.points[i] += moved[0] + (moved[1] - moved[0]) * (i / (edge.count - 1.0));
+  };
+  carry_edge(anchor_);
+  for (std::size_t s = next_; s < strips_.size(); ++s) {
+    carry_edge(strips_[s].from);
+    carry_edge(strips_[s].to);
+  }
+}
+
 void BladeMotion::finish(double h, const Settings& settings) {
   if (now_.count > 0 && longest_motion(anchor_, now_) > kRest_h * h) add_strips(h, settings);
 }
