@@ -1,6 +1,12 @@
 #include "server/tissue/dynamics/nodal_hyperelastic.h"
 
 namespace trocar::dynamics {
+namespace {
+
+// A domain that has less than this share of its volume begins to fold, or is folded.
+constexpr float kFoldsFrom = 0.4f, kIsFolded = 0.2f;
+
+}  // namespace
 
 template <typename Law>
 NodalHyperelastic<Law>::NodalHyperelastic(const topology::Topology& topology, const Groups& groups,
@@ -81,7 +87,8 @@ void NodalHyperelastic<Law>::add_stress(Group group, const NodalStrain::Gradient
   }
   const auto& [f0, f1, f2] = f.rows;
   const Vec8 k0 = cross8(f1, f2), k1 = cross8(f2, f0), k2 = cross8(f0, f1);  // cofactors
-  const Float8 pressure = fma8(bulk, dot8(f0, k0) - all(1), all(0) - two_c10);
+  const Float8 volume_ratio = dot8(f0, k0);
+  const Float8 pressure = fma8(bulk, volume_ratio - all(1), all(0) - two_c10);
   Float8 shear = two_c10, stiff = two_c10;
   if constexpr (!Law::kIsLinear) {
     const Float8 i1 = dot8(f0, f0) + (dot8(f1, f1) + dot8(f2, f2));
@@ -98,7 +105,16 @@ void NodalHyperelastic<Law>::add_stress(Group group, const NodalStrain::Gradient
   const Float8 largest =
       _mm256_max_ps(dot8(k0, k0) + (k01 + k02),
                     _mm256_max_ps(dot8(k1, k1) + (k01 + k12), dot8(k2, k2) + (k02 + k12)));
-  stress.stiffness = fma8(fma8(bulk, largest, stiff), f.inverse_volume, stress.stiffness);
+  const Float8 bound = fma8(bulk, largest, stiff) * f.inverse_volume;
+  stress.stiffness = stress.stiffness + bound;
+  const Float8 folded = _mm256_max_ps(
+      _mm256_min_ps((all(kFoldsFrom) - volume_ratio) * all(1 / (kFoldsFrom - kIsFolded)), all(1)),
+      all(0));
+  if (_mm256_movemask_ps(_mm256_cmp_ps(folded, all(0), _CMP_GT_OQ)) == 0) return;
+  // The volume's second derivative is no larger than the gradient.
+  const Float8 squared = dot8(f0, f0) + (dot8(f1, f1) + dot8(f2, f2));
+  const Float8 geometric = abs8(pressure) * _mm256_sqrt_ps(squared) * f.inverse_volume;
+  stress.creep = fma8(folded, bound + geometric, stress.creep);
 }
 
 template <typename Law>

@@ -75,7 +75,7 @@ void Tissue::update_nodal_stress(Group group, const Float4* x) {
   constexpr auto kRows = NodalStrain::kRows;
   nodal_strain_->restart_group(group, x);
   const auto f = nodal_strain_->gradient_of(group);
-  NodalStress8 stress{{zero_vec8(), zero_vec8(), zero_vec8()}, all(0)};
+  NodalStress8 stress{{zero_vec8(), zero_vec8(), zero_vec8()}, all(0), all(0)};
   for (const auto& energy : averaged_) energy->add_stress(group, f, stress);
   const std::size_t first = kRows * kLanes * group;
   if (const auto* const relaxation = relaxation_ ? relaxation_->nodal() : nullptr) {
@@ -88,19 +88,22 @@ void Tissue::update_nodal_stress(Group group, const Float4* x) {
           stress.rows[r] - Vec8{dot8(f.rows[r], q0), dot8(f.rows[r], q1), dot8(f.rows[r], q2)};
   }
   for (std::size_t r = 0; r < kRows; ++r)
-    store_strided(&nodal_stresses_[first + r], kRows, stress.rows[r], stress.stiffness);
+    store_strided(&nodal_stresses_[first + r], kRows, stress.rows[r],
+                  r == 0 ? stress.stiffness : stress.creep);
 }
 
 Tissue::NodalForces Tissue::nodal_forces(Group group) const {
-  NodalForces forces{zero_vec8(), all(0)};
+  NodalForces forces{zero_vec8(), all(0), all(0)};
   const Float4* const stresses = nodal_stresses_.data();
   for (const auto& row : nodal_strain_->rows(group)) {
     const Vec8 b = load(row.part);
-    Float8 stiffness;
-    const Vec8 p0 = gather(stresses, row.domain, stiffness), p1 = gather(stresses + 1, row.domain),
-               p2 = gather(stresses + 2, row.domain);
+    Float8 stiffness, creep;
+    const Vec8 p0 = gather(stresses, row.domain, stiffness),
+               p1 = gather(stresses + 1, row.domain, creep), p2 = gather(stresses + 2, row.domain);
     forces.gradient = forces.gradient + Vec8{dot8(p0, b), dot8(p1, b), dot8(p2, b)};
-    forces.stiffness = fma8(stiffness, dot8(b, b), forces.stiffness);
+    const Float8 squared = dot8(b, b);
+    forces.stiffness = fma8(stiffness, squared, forces.stiffness);
+    forces.creep = fma8(creep, squared, forces.creep);
   }
   return forces;
 }
