@@ -2,12 +2,12 @@
 // from outside cannot break it.
 
 #include "server/tissue/step/simulation.h"
-#include "server/tissue/contact/proxies.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "server/tissue/contact/proxies.h"
 #include "tests/step/hands.h"
 
 namespace trocar::step {
