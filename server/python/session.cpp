@@ -161,11 +161,11 @@ Tick Session::tick() const {
 Vec3f Session::force(ToolSlot tool) const {
   check_free();
   const auto& state = simulation_.state();
-  if (state.claims.claim(tool).verb == tool::Verb::Cut) return state.cuts.felt(tool).force_n;
+  Vec3f force = state.cuts.felt(tool).force_n;
   const auto& contacts = simulation_.context().contact.found;
   for (const auto& contact : contacts.tools)
-    if (contact.tool == tool) return contact::reaction_on(contacts, contact, state.world).force_n;
-  return {};
+    if (contact.tool == tool) force += contact::reaction_on(contacts, contact, state.world).force_n;
+  return force;
 }
 
 Vec3f Session::tip(ToolSlot tool) const {

@@ -44,13 +44,12 @@ void FeltOrgan::tick_at(const ToolReading& reading) {
 
 Vec3d FeltOrgan::force_n() const {
   const auto& state = simulation_.state();
-  if (state.claims.claim(kTool).verb == tool::Verb::Cut)
-    return to_double(state.cuts.felt(kTool).force_n);
+  Vec3d force = to_double(state.cuts.felt(kTool).force_n);
   const auto& found = simulation_.context().contact.found;
   for (const auto& contact : found.tools)
     if (contact.tool == kTool)
-      return to_double(contact::reaction_on(found, contact, state.world).force_n);
-  return {};
+      force += to_double(contact::reaction_on(found, contact, state.world).force_n);
+  return force;
 }
 
 std::optional<wire::HapticPatch> FeltOrgan::pop_patch() {

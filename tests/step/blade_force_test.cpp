@@ -228,8 +228,9 @@ TEST(BladeForce, IsOverSoonAfterTissue) {
     scene.run(0.001f);
     ASSERT_LT(scene.simulation().current_tick(), 400u);
   }
-  EXPECT_NE(scene.felt().force_n, Vec3f{});
-  scene.run(0.008f);
+  const float left_n = length(scene.felt().force_n);
+  EXPECT_GT(left_n, 0);
+  scene.run(0.008f + left_n / (1000 * blades::kMostStep_n));
   EXPECT_EQ(scene.felt().force_n, Vec3f{});
 }
 
@@ -275,6 +276,49 @@ TEST(BladeForce, IsLittleInAWoundThatIsThere) {
   EXPECT_GT(into_j, 0.35);
   EXPECT_LT(back_j, 0.1 * into_j);
   EXPECT_LT(again_j, 0.1 * into_j);
+}
+
+// A blade goes towards what a grasp holds, is stopped there, and goes on for 12 mm. Then the jaws
+// open, or the blade is lifted: no hand feels a step.
+TEST(BladeForce, ChangesGraduallyWhereABladeIsStopped) {
+  constexpr float kMost_n = 0.3f, kRounding_n = 1e-4f;
+  const auto organ = block(0.01);
+  for (const bool is_lifted : {false, true}) {
+    SCOPED_TRACE(is_lifted ? "the blade is lifted" : "the jaws open");
+    Simulation simulation(organ);
+    const ToolSlot blade = tool_slot({0}, 0), jaws = tool_slot({1}, 0);
+    Vec3f last;
+    float most_step_n = 0, most_n = 0;
+    for (Tick tick = 1; tick <= 1500; ++tick) {
+      hands::TickInputs inputs;
+      if (tick == 1)
+        for (std::uint8_t hand = 0; hand < 2; ++hand) {
+          hands::HandJoin join{.slot = {hand}};
+          join.shapes[0] = {
+              .radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.012f, .edge_m = 0.05f};
+          inputs.joins.push_back(join);
+        }
+      const bool is_over = tick > 1000;
+      const float x = -0.07f + 0.1f * std::min(0.7f, static_cast<float>(tick) * 1e-3f);
+      if (tick % 8 == 1) {
+        inputs.samples.push_back({blade,
+                                  {{{x, -0.01f, 0.0013f}, rotation_from_z({0, 1, 0})},
+                                   is_over && is_lifted ? tool::Verb::None : tool::Verb::Cut}});
+        inputs.samples.push_back({jaws,
+                                  {{{-0.01f, 0.02f, 0}, rotation_from_z({0, 1, 0})},
+                                   is_over && !is_lifted ? tool::Verb::None : tool::Verb::Grasp}});
+      }
+      simulation.tick(inputs, {});
+      const Vec3f now = simulation.state().cuts.felt(blade).force_n;
+      most_step_n = std::max(most_step_n, length(now - last));
+      most_n = std::max(most_n, length(now));
+      last = now;
+    }
+    std::printf("up to %.2f N, by %.3f N in a tick\n", most_n, most_step_n);
+    EXPECT_GT(most_n, 4);
+    EXPECT_LE(most_step_n, kMost_n + kRounding_n);
+    EXPECT_EQ(length(last), 0);
+  }
 }
 
 TEST(BladeForce, GoesOnFromASnapshot) {

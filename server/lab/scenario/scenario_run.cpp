@@ -405,12 +405,11 @@ StepReport ScenarioRun::step() {
 Vec3d ScenarioRun::force_on(ToolSlot tool) const {
   const auto& state = simulation_.state();
   const auto& contacts = simulation_.context().contact.found;
-  if (state.claims.claim(tool).verb == tool::Verb::Cut)
-    return to_double(state.cuts.felt(tool).force_n);
+  Vec3d force = to_double(state.cuts.felt(tool).force_n);
   for (const auto& contact : contacts.tools)
     if (contact.tool == tool)
-      return to_double(contact::reaction_on(contacts, contact, state.world).force_n);
-  return {};
+      force += to_double(contact::reaction_on(contacts, contact, state.world).force_n);
+  return force;
 }
 
 Vec3d ScenarioRun::probe(std::size_t index) const {

@@ -5,6 +5,9 @@
 // A blade cuts while its claim is held, and feels what edge_force.h says. Where a claim is refused
 // the blade is stopped: a hand that goes on feels a spring from there, which lets it back. Of
 // scissors a hand feels nothing: what they cut, their closing works for.
+//
+// Where one of these ends and another begins, the force follows by at most kMostStep_n in a tick,
+// and so it goes after a blade that is lifted.
 
 #include <array>
 
@@ -14,12 +17,19 @@
 
 namespace trocar::blades {
 
+// No hand feels a force that changes faster, N in a tick.
+inline constexpr float kMostStep_n = 0.3f;
+
 struct Blade {
   bool is_at_work = false;  // its verb is cut; the rest is valid
   bool is_cutting = false, is_stopped = false;
   EdgeForce edge;
   Vec3f stop, ahead;  // stopped: where the tip was, and towards what, of length 1 or 0
   Wrench felt;
+
+  bool is_felt() const {
+    return length_squared(felt.force_n) > 0 || length_squared(felt.torque_nm) > 0;
+  }
 };
 
 // The hand does this part of the work that opens a wound; an energised edge burns its way.

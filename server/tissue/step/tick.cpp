@@ -317,10 +317,8 @@ ToolFrame describe_tool(const State& state, const contact::ContactList& contacts
     frame.torque_nm = reaction.torque_nm;
     frame.penetration_m = reaction.penetration_m;
   }
-  if (state.claims.claim(slot).verb == tool::Verb::Cut) {
-    frame.force_n = state.cuts.felt(slot).force_n;
-    frame.torque_nm = state.cuts.felt(slot).torque_nm;
-  }
+  frame.force_n += state.cuts.felt(slot).force_n;
+  frame.torque_nm += state.cuts.felt(slot).torque_nm;
   return frame;
 }
 
