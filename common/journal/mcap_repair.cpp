@@ -30,10 +30,9 @@ Result<RepairReport> repair(const std::string& from, const std::string& to) {
                           {{"file", std::filesystem::path(from).filename().string()},
                            {"dropped_bytes", std::to_string(report.dropped_bytes)},
                            {"damaged_chunks", std::to_string(report.damaged_chunks)}}};
-  const auto as_it_is = [](const McapChannel&, const McapMessage& message) {
-    return Result<BytesView>(message.data);
-  };
-  if (auto copied = copy_recording(reader, to, as_it_is, note); !copied) return copied.error();
+  CopyOptions options;
+  options.note = note;
+  if (auto copied = copy_recording(reader, to, options); !copied) return copied.error();
   return report;
 }
 

@@ -8,6 +8,7 @@
 #include "common/base/printable.h"
 #include "common/budget/message_budget.h"
 #include "common/journal/mcap_repair.h"
+#include "common/journal/recording_end.h"
 
 namespace trocar::journal {
 namespace {
@@ -79,8 +80,10 @@ Status SessionJournal::read_info() {
   info_.last_tick = times_.tick(mcap_->statistics().end_time);
   const bool is_repaired = std::ranges::any_of(
       all, [](const McapMetadata& m) { return m.name == kRepairedMetadataName; });
-  info_.is_finished = mcap_->is_finished() && !is_repaired;
+  const auto end = check_counts(*mcap_);
+  info_.is_finished = mcap_->is_finished() && !is_repaired && end.status != EndStatus::Wrong;
   info_.summary = mcap_->summary_text();
+  if (end.status == EndStatus::Wrong) info_.summary += ", " + end.text;
   if (is_repaired) info_.summary += ", repaired: what the writer lost is missing";
   return read_participants();
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/journal/mcap_reader.h"
+#include "common/journal/recording_end.h"
 #include "common/journal/session_topics.h"
 #include "proto/journal.pb.h"
 #include "proto/organ.pb.h"
@@ -42,9 +43,10 @@ struct SessionInfo {
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
   std::uint64_t gap_messages = 0;                // that the session dropped while recording
-  std::vector<Tick> joins;   // after these, another server has gone on; kMostParts at most
-  bool is_finished = false;  // by its writer; not if it was repaired
-  std::string summary;       // one line for people
+  std::vector<Tick> joins;  // after these, another server has gone on; kMostParts at most
+  // By its writer; not if it was repaired, or if its end counts other messages than its summary.
+  bool is_finished = false;
+  std::string summary;  // one line for people
 
   // The tick after which this journal begins.
   Tick begin_tick() const { return continues ? continues->tick : trimmed ? trimmed->tick : 0; }
@@ -87,6 +89,7 @@ class SessionJournal {
   // Every message there is, in the order in which they were recorded, with its channel's topic.
   using BytesVisitor = std::function<bool(std::string_view topic, Tick, BytesView)>;
   ReadReport read_all(const BytesVisitor& visitor);
+  EndReport check_end() { return journal::check_end(*mcap_); }  // reads every message
 
   // The latest at or before `tick`; nothing if there is none.
   Result<std::optional<proto::WorldSnapshot>> snapshot_before(Tick tick);

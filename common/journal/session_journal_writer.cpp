@@ -56,9 +56,11 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
   if (session.has_external_loads) metadata.entries["external_loads"] = "in /loads";
   if (session.starts_from_snapshot) metadata.entries["start"] = "snapshot";
   if (session.has_implicit_strain) metadata.entries["averaged_strain"] = "implicit";
-  if (Status written = (*mcap)->write_metadata(metadata); !written.ok()) return written.error();
-  return std::unique_ptr<SessionJournalWriter>(
+  metadata.entries[kPromisedEnd] = kEndMetadataName;
+  std::unique_ptr<SessionJournalWriter> writer(
       new SessionJournalWriter(std::move(*mcap), JournalTimes{session.start_utc_ns}));
+  if (Status written = writer->write_metadata(metadata); !written.ok()) return written.error();
+  return writer;
 }
 
 SessionJournalWriter::SessionJournalWriter(std::unique_ptr<McapWriter> mcap, JournalTimes times)
@@ -78,8 +80,31 @@ std::uint16_t SessionJournalWriter::schema_of(const google::protobuf::Descriptor
 
 Status SessionJournalWriter::write(JournalTopic topic, Tick tick, std::uint64_t publish_time_ns,
                                    BytesView message) {
-  return mcap_->write(channel_ids_[static_cast<std::size_t>(topic)], times_.log_time(tick),
-                      publish_time_ns, message);
+  return append(channel_ids_[static_cast<std::size_t>(topic)], topic_name(topic), tick,
+                publish_time_ns, message);
+}
+
+Status SessionJournalWriter::append(std::uint16_t channel, std::string_view topic, Tick tick,
+                                    std::uint64_t publish_time_ns, BytesView message) {
+  const auto log_time = times_.log_time(tick);
+  if (Status written = mcap_->write(channel, log_time, publish_time_ns, message); !written.ok())
+    return written;
+  sum_.add(topic, log_time, publish_time_ns, message);
+  return {};
+}
+
+Status SessionJournalWriter::write_metadata(const McapMetadata& metadata) {
+  sum_.add(metadata);
+  return mcap_->write_metadata(metadata);
+}
+
+Status SessionJournalWriter::close(const secure::SigningKey* key) {
+  if (Status flushed = flush(); !flushed.ok()) return flushed;
+  const auto end = sum_.end();
+  if (Status written = write_metadata(end); !written.ok()) return written;
+  if (key != nullptr)
+    if (Status written = write_metadata(sign(end, *key)); !written.ok()) return written;
+  return mcap_->close();
 }
 
 Status SessionJournalWriter::write(JournalTopic topic, Tick tick, std::uint64_t publish_time_ns,
@@ -101,13 +126,14 @@ Status SessionJournalWriter::write_overview(Tick tick, std::uint64_t now_ns,
 Status SessionJournalWriter::write_tool(ToolSlot tool, Tick tick, std::uint64_t publish_time_ns,
                                         const proto::ToolState& state) {
   TROCAR_ASSERT(tool.is_valid());
+  const auto topic = "/tool/" + std::to_string(tool.value);
   std::uint16_t& channel = tool_channel_ids_[tool.value];
   if (channel == 0)
-    channel = mcap_->add_channel("/tool/" + std::to_string(tool.value), kProtobufEncoding,
-                                 schema_of(*proto::ToolState::descriptor()));
+    channel =
+        mcap_->add_channel(topic, kProtobufEncoding, schema_of(*proto::ToolState::descriptor()));
   scratch_.resize(state.ByteSizeLong());
   state.SerializeWithCachedSizesToArray(scratch_.data());
-  return mcap_->write(channel, times_.log_time(tick), publish_time_ns, scratch_);
+  return append(channel, topic, tick, publish_time_ns, scratch_);
 }
 
 }  // namespace trocar::journal

@@ -11,6 +11,7 @@
 #include "common/base/ids.h"
 #include "common/base/version.h"
 #include "common/journal/mcap_writer.h"
+#include "common/journal/recording_end.h"
 #include "common/journal/session_topics.h"
 #include "proto/journal.pb.h"
 #include "proto/organ.pb.h"
@@ -99,11 +100,11 @@ class SessionJournalWriter {
   [[nodiscard]] Status write_overview(Tick tick, std::uint64_t now_ns,
                                       const proto::Overview& overview);
 
-  [[nodiscard]] Status write_metadata(const McapMetadata& metadata) {
-    return mcap_->write_metadata(metadata);
-  }
+  [[nodiscard]] Status write_metadata(const McapMetadata& metadata);
   [[nodiscard]] Status flush() { return mcap_->flush(); }
-  [[nodiscard]] Status close() { return mcap_->close(); }  // once, at the session's end
+  // Once, at the session's end: writes what all messages add up to, signed by `key` unless it is
+  // null, and the summary.
+  [[nodiscard]] Status close(const secure::SigningKey* key = nullptr);
   std::uint64_t bytes_written() const { return mcap_->bytes_written(); }
   std::uint64_t sync_count() const { return mcap_->sync_count(); }
   const McapStatistics& statistics() const { return mcap_->statistics(); }
@@ -111,9 +112,12 @@ class SessionJournalWriter {
  private:
   SessionJournalWriter(std::unique_ptr<McapWriter> mcap, JournalTimes times);
   std::uint16_t schema_of(const google::protobuf::Descriptor& message);
+  Status append(std::uint16_t channel, std::string_view topic, Tick tick,
+                std::uint64_t publish_time_ns, BytesView message);
 
   std::unique_ptr<McapWriter> mcap_;
   JournalTimes times_;
+  ContentSum sum_;
   std::map<std::string, std::uint16_t> schema_ids_;  // by full name
   std::array<std::uint16_t, kJournalTopicCount> channel_ids_{};
   std::array<std::uint16_t, kMaxTools> tool_channel_ids_{};  // 0: not yet

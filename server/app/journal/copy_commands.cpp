@@ -9,8 +9,10 @@
 #include "common/base/number_option.h"
 #include "common/base/result.h"
 #include "common/base/tick.h"
+#include "common/secure/signing.h"
 #include "server/app/journal/program_name.h"
 #include "server/session/recording/merge.h"
+#include "server/session/recording/sign.h"
 #include "server/session/recording/trim.h"
 
 namespace trocar::app {
@@ -86,6 +88,27 @@ int trim_recording(const TrimCommand& options) {
     std::printf(
         "It was recorded with another sim_version: verify decodes its surfaces, and can "
         "simulate nothing of it again.\n");
+  return 0;
+}
+
+void add_options(CLI::App& command, SignCommand& options) {
+  command.add_option("FILE", options.file, "the journal (.mcap)")->required();
+  command.add_option("NEW", options.to, "the file to write, which must not exist")->required();
+  command
+      .add_option("--key", options.key_file,
+                  "private Ed25519 key (PEM), as openssl genpkey -algorithm ed25519 makes one")
+      ->type_name("FILE")
+      ->required();
+}
+
+int sign_recording(const SignCommand& options) {
+  const auto key = secure::SigningKey::read(options.key_file);
+  if (!key) return report(kProgram, key.error());
+  const auto signed_here = recording::sign(options.file, options.to, *key);
+  if (!signed_here) return report(kProgram, signed_here.error());
+  std::printf("%s: %" PRIu64 " messages, signed with the key of %s\n", options.to.c_str(),
+              signed_here->messages, options.key_file.c_str());
+  if (!signed_here->note.empty()) std::printf("%s\n", signed_here->note.c_str());
   return 0;
 }
 

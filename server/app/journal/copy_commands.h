@@ -1,6 +1,6 @@
 #pragma once
 
-// trocar-journal merge and trim: recordings written again as others.
+// trocar-journal merge, trim and sign: recordings written again as others.
 
 #include <optional>
 #include <string>
@@ -26,5 +26,11 @@ struct TrimCommand {
 };
 void add_options(CLI::App& command, TrimCommand& options);
 int trim_recording(const TrimCommand& options);
+
+struct SignCommand {
+  std::string file, to, key_file;
+};
+void add_options(CLI::App& command, SignCommand& options);
+int sign_recording(const SignCommand& options);
 
 }  // namespace trocar::app

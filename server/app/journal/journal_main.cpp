@@ -16,6 +16,7 @@
 #include "common/base/unfinished_file.h"
 #include "common/base/version.h"
 #include "common/journal/mcap_repair.h"
+#include "common/journal/recording_end.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
 #include "server/app/journal/assess_command.h"
@@ -162,7 +163,19 @@ std::string text_of(const std::string& path, const recording::VerifyReport& r) {
   return out;
 }
 
-int verify(const std::string& path, const std::string& reduction_file, bool as_json) {
+// Says whether all of a recording is as the owner of that key signed it.
+Status check_owner(const std::string& path, const std::string& key_file) {
+  const auto key = secure::read_public_key(key_file);
+  if (!key) return key.error();
+  auto reader = journal::McapReader::open(path);
+  if (!reader) return reader.error();
+  return journal::check_signature(**reader, *key, key_file);
+}
+
+int verify(const std::string& path, const std::string& reduction_file, const std::string& key_file,
+           bool as_json) {
+  if (!key_file.empty())
+    if (auto fine = check_owner(path, key_file); !fine) return report(kProgram, fine.error());
   const std::uint64_t started = monotonic_ns();
   const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
   bool is_progress_shown = false;
@@ -177,8 +190,14 @@ int verify(const std::string& path, const std::string& reduction_file, bool as_j
       reduction_file);
   if (is_progress_shown) std::fprintf(stderr, "\n");
   if (!verified) return report(kProgram, verified.error());
-  std::fputs(as_json ? to_text(json_of(*verified)).c_str() : text_of(path, *verified).c_str(),
-             stdout);
+  if (as_json) {
+    auto json = json_of(*verified);
+    json["signed_with"] = key_file.empty() ? Json() : Json(key_file);
+    std::fputs(to_text(json).c_str(), stdout);
+  } else {
+    std::fputs(text_of(path, *verified).c_str(), stdout);
+    if (!key_file.empty()) std::printf("signed with the key of %s\n", key_file.c_str());
+  }
   switch (verified->verdict()) {
     case recording::Verdict::Verified:
       return static_cast<int>(ExitCode::Ok);
@@ -259,7 +278,12 @@ int run(int argc, char** argv) {
       "                                                half a minute of it, which verifies\n"
       "  trocar-journal anonymise session.mcap shared.mcap\n"
       "                                                a copy without names, which verifies\n"
-      "Exit codes: 0 done or verified, 1 difference found, 2 usage, 3 file cannot be read or is\n"
+      "  trocar-journal sign session.mcap signed.mcap --key key.pem\n"
+      "                                                a copy that shows whose it is\n"
+      "  trocar-journal verify signed.mcap --check key.pub\n"
+      "                                                is it theirs, and as they signed it?\n"
+      "Exit codes: 0 done or verified, 1 difference found or not signed so, 2 usage, 3 file cannot "
+      "be read or is\n"
       "not overwritten, 4 storage refuses, 5 something is missing or cannot be written, 6 not all\n"
       "could be verified, though nothing differs: the reasons are printed. A signal such as\n"
       "SIGTERM ends it without one, and leaves no half of a file.");
@@ -316,7 +340,15 @@ int run(int argc, char** argv) {
   PushCommand push_command;
   auto* bring = app.add_subcommand("push", "Bring recordings to S3-compatible storage");
   add_options(*bring, push_command);
-  std::string reduction_file;
+  SignCommand sign_command;
+  auto* seal = app.add_subcommand("sign", "Write a recording again with a signature");
+  add_options(*seal, sign_command);
+  std::string reduction_file, owner_file;
+  check
+      ->add_option("--check", owner_file,
+                   "public Ed25519 key (PEM): before all else, whether its owner signed the "
+                   "recording as it is")
+      ->type_name("KEY");
   check->add_option("--reduction", reduction_file, "of the session, if it had one")
       ->type_name("FILE");
   try {
@@ -328,6 +360,7 @@ int run(int argc, char** argv) {
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (measure->parsed()) return assess(assess_options);
   if (cut->parsed()) return trim_recording(trim_command);
+  if (seal->parsed()) return sign_recording(sign_command);
   if (bring->parsed()) return push(push_command);
   if (join->parsed()) return merge_parts(merge_options);
   if (mend->parsed()) return repair(path, repaired_path);
@@ -342,7 +375,8 @@ int run(int argc, char** argv) {
     const int forces = force_table.empty() ? 0 : export_forces(path, force_table);
     return forces != 0 || lesson_table.empty() ? forces : export_lesson(path, lesson_table);
   }
-  return check->parsed() ? verify(path, reduction_file, as_json) : show_info(path, as_json);
+  return check->parsed() ? verify(path, reduction_file, owner_file, as_json)
+                         : show_info(path, as_json);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "common/base/printable.h"
 #include "common/base/result.h"
 #include "common/journal/mcap_reader.h"
+#include "common/journal/recording_end.h"
 #include "server/app/journal/program_name.h"
 #include "server/app/journal/recordings_of.h"
 #include "server/session/archive/push.h"
@@ -43,6 +44,8 @@ Result<std::unique_ptr<archive::S3Client>> client_of(const PushCommand& options)
 Status check_whole(const fs::path& file) {
   const auto reader = journal::McapReader::open(file.string());
   if (!reader) return reader.error();
+  if (const auto end = journal::check_counts(**reader); end.status == journal::EndStatus::Wrong)
+    return Error{ErrorCode::BadFile, file.string() + ": " + end.text};
   if ((*reader)->is_finished()) return {};
   return Error{ErrorCode::BadFile,
                file.string() +

@@ -77,6 +77,7 @@ Status check_start(const ServerOptions& options) {
   if (const auto s = check_organ(options, of); !s) return s;
   if (options.journal != "none")
     if (const auto s = check_journal(options.journal); !s) return of("journal", s);
+  if (const auto s = read_signing_key(options); !s) return of("sign", s.error());
   if (!access.audit_file.empty())
     if (const auto s = check_writable(access.audit_file); !s) return of("audit", s);
   return of("summary", check_end(options));

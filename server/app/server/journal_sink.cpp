@@ -37,12 +37,13 @@ Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
     const std::optional<journal::ReductionDescription>& reduction,
     const std::optional<journal::Continuation>& continues,
-    const std::optional<bleeding::Rules>& bleeding) {
+    const std::optional<bleeding::Rules>& bleeding, const std::optional<secure::SigningKey>& key) {
   if (path == "none") return std::unique_ptr<JournalSink>();
   recording::Beginning beginning;
   beginning.reduction = reduction;
   beginning.continues = continues;
   beginning.bleeding = bleeding;
+  beginning.key = key;
   auto recorder = recording::Recorder::create(path, organ, layout, beginning);
   if (!recorder) return recorder.error();
   return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));

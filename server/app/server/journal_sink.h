@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/journal/session_topics.h"
+#include "common/secure/signing.h"
 #include "common/wire/hand_report.h"
 #include "common/wire/lesson.h"
 #include "common/wire/recording_state.h"
@@ -46,12 +47,14 @@ class JournalSink {
 };
 
 // A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
-// continues: with which journal's session it goes on. bleeding: of a session that bleeds.
+// continues: with which journal's session it goes on. bleeding: of a session that bleeds. key:
+// signs the recording at its end.
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
     const std::optional<journal::ReductionDescription>& reduction = {},
     const std::optional<journal::Continuation>& continues = {},
-    const std::optional<bleeding::Rules>& bleeding = {});
+    const std::optional<bleeding::Rules>& bleeding = {},
+    const std::optional<secure::SigningKey>& key = {});
 
 // "./trocar-20261121T135400Z.mcap"
 std::string default_journal_path();

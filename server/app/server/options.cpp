@@ -303,6 +303,9 @@ void CommandLine::add_session_options() {
   app_.add_option("--journal", options_.journal,
                   "file to record the session in, or none [./trocar-<UTC>.mcap]")
       ->type_name("FILE");
+  app_.add_option("--sign", options_.signing_key_file,
+                  "sign the recording at its end with this private Ed25519 key (PEM)")
+      ->type_name("KEY");
   app_.add_option("--resume", options_.resume_file,
                   "go on where this recording of a killed server ends; the organ is in it")
       ->type_name("FILE");

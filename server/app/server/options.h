@@ -34,6 +34,7 @@ struct ServerOptions {
   std::string announced_name;      // on the local network; empty: made from organ and machine
   bool is_unannounced = false;     // otherwise it is announced where others may reach it
   std::string journal;             // a file, or "none"
+  std::string signing_key_file;    // of the recording; empty: it is not signed
   double seconds = 0;              // simulated; 0: until told to end
   double pace = 1;                 // of real time at most, while hands follow
   std::size_t awaited_people = 0;  // time begins when so many are there

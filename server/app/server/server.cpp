@@ -177,8 +177,8 @@ Status Server::open() {
 
   const auto bleeding =
       start_.bleeding ? std::optional(start_.bleeding->rules()) : std::optional<bleeding::Rules>();
-  auto journal =
-      open_journal(options_.journal, organ, layout, reduction_, start_.continues, bleeding);
+  auto journal = open_journal(options_.journal, organ, layout, reduction_, start_.continues,
+                              bleeding, start_.key);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 

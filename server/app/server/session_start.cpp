@@ -146,8 +146,21 @@ Status choose_strain(const ServerOptions& options, organ::Organ& organ) {
   return {};
 }
 
+Result<std::optional<secure::SigningKey>> read_signing_key(const ServerOptions& options) {
+  if (options.signing_key_file.empty()) return std::optional<secure::SigningKey>();
+  if (options.journal == "none")
+    return Error{ErrorCode::Usage, "--sign: --journal is none, there is nothing to sign"};
+  auto key = secure::SigningKey::read(options.signing_key_file);
+  if (!key) return Error{key.error().code, "--sign: " + key.error().message};
+  return std::optional(std::move(*key));
+}
+
 Result<SessionStart> start_session(const ServerOptions& options) {
-  return options.resume_file.empty() ? begin(options) : go_on(options);
+  auto key = read_signing_key(options);
+  if (!key) return key.error();
+  auto start = options.resume_file.empty() ? begin(options) : go_on(options);
+  if (start) start->key = std::move(*key);
+  return start;
 }
 
 }  // namespace trocar::app

@@ -9,6 +9,7 @@
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
 #include "common/lesson/course.h"
+#include "common/secure/signing.h"
 #include "server/app/server/options.h"
 #include "server/organs/organ/organ.h"
 #include "server/session/bleeding/bleeding.h"
@@ -21,6 +22,7 @@ struct SessionStart {
   step::Simulation simulation;
   std::optional<journal::ReductionDescription> reduction;
   std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
+  std::optional<secure::SigningKey> key;       // signs the recording
   // The rest is of a session that goes on.
   std::optional<journal::Continuation> continues;
   std::shared_ptr<lesson::Course> course;               // null: no lesson had begun
@@ -30,6 +32,9 @@ struct SessionStart {
 
 // Strain averaged or plain, as the options say. A reduction is of plain tets.
 Status choose_strain(const ServerOptions& options, organ::Organ& organ);
+
+// Reads the key that --sign names; nothing if it names none.
+Result<std::optional<secure::SigningKey>> read_signing_key(const ServerOptions& options);
 
 // Reads what the options name, and says what it did where that takes long.
 Result<SessionStart> start_session(const ServerOptions& options);

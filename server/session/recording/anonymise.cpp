@@ -10,6 +10,7 @@
 
 #include "common/budget/message_budget.h"
 #include "common/journal/mcap_copy.h"
+#include "common/journal/recording_end.h"
 #include "common/journal/session_topics.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
@@ -55,13 +56,11 @@ void each_text(Message& message, const Visitor& visit) {
 
 // Entries of metadata that say nothing of people. Others hold names of files.
 constexpr std::string_view kHarmlessEntries[] = {
-    "averaged_strain", "continues_tick",   "damaged_chunks",
-    "dropped_bytes",   "external_loads",   "from_tick",
-    "joins",           "organ_hash",       "organ_name",
-    "people",          "protocol",         "reduction_file",
-    "reduction_hash",  "reduction_source", "sim_version",
-    "start",           "start_utc",        "start_utc_ns",
-    "to_tick",         "trimmed_tick",     "words"};
+    "averaged_strain", "continues_tick", "damaged_chunks", "dropped_bytes",  "end",
+    "external_loads",  "from_tick",      "joins",          "organ_hash",     "organ_name",
+    "people",          "protocol",       "reduction_file", "reduction_hash", "reduction_source",
+    "sim_version",     "start",          "start_utc",      "start_utc_ns",   "to_tick",
+    "trimmed_tick",    "words"};
 
 journal::McapMetadata without_files(journal::McapMetadata metadata) {
   for (auto& [key, value] : metadata.entries)
@@ -208,17 +207,18 @@ Result<AnonymiseReport> anonymise(const std::string& from, const std::string& to
         from + ": is cut short or damaged: trocar-journal repair makes a whole file of it"};
   };
   if (!(*opened)->is_finished()) return damaged();
+  if (auto right = journal::refuse_wrong_end(**opened); !right) return right.error();
   Anonymiser anonymiser(from, keeps_words);
   if (auto collected = anonymiser.collect(**opened); !collected) return collected.error();
-  const journal::McapMetadata note{kAnonymisedMetadataName,
-                                   {{"people", std::to_string(anonymiser.people())},
-                                    {"words", keeps_words ? "kept" : "taken out"}}};
-  const auto copied = copy_recording(
-      **opened, to,
-      [&](const journal::McapChannel& channel, const journal::McapMessage& message) {
-        return anonymiser.change(channel, message);
-      },
-      note, without_files);
+  journal::CopyOptions options;
+  options.change = [&](const journal::McapChannel& channel, const journal::McapMessage& message) {
+    return anonymiser.change(channel, message);
+  };
+  options.change_metadata = without_files;
+  options.note = journal::McapMetadata{kAnonymisedMetadataName,
+                                       {{"people", std::to_string(anonymiser.people())},
+                                        {"words", keeps_words ? "kept" : "taken out"}}};
+  const auto copied = copy_recording(**opened, to, options);
   if (!copied) return copied.error();
   return AnonymiseReport{anonymiser.people(), anonymiser.words()};
 }

@@ -9,6 +9,7 @@
 
 #include "common/journal/mcap_reader.h"
 #include "common/journal/mcap_repair.h"
+#include "common/journal/recording_end.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
 #include "server/session/recording/session_copy.h"
@@ -115,6 +116,7 @@ class Merger {
     const auto& part = session_.parts[number];
     auto reader = journal::McapReader::open(part.path);
     if (!reader) return reader.error();
+    if (auto right = journal::refuse_wrong_end(**reader); !right) return right;
     const bool is_last = number + 1 == session_.parts.size();
     // The lost end of an earlier part does not count.
     if (auto noted = copy_.copy_metadata(**reader, is_last); !noted) return noted;

@@ -88,16 +88,18 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
   if (auto s = (*writer)->write_topology(begin_tick, now, topology); !s) return s.error();
   if (auto s = (*writer)->flush(); !s) return s.error();
   return std::unique_ptr<Recorder>(
-      new Recorder(std::move(*writer), organ, hash, layout, begin_tick));
+      new Recorder(std::move(*writer), organ, hash, layout, begin_tick, beginning.key));
 }
 
 Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
-                   std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick)
+                   std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick,
+                   std::optional<secure::SigningKey> key)
     : writer_(std::move(writer)),
       messages_(organ.name, layout),
       overview_(begin_tick),
       last_tick_(begin_tick),
       organ_hash_(organ_hash),
+      key_(std::move(key)),
       thread_([this] { run(); }) {}
 
 Recorder::~Recorder() {
@@ -209,7 +211,7 @@ Status Recorder::finish_file() {
   is_finished_ = true;
   if (!overview_.is_empty())
     if (auto s = write_overview(); !s) return s;
-  return writer_->close();
+  return close_file();
 }
 
 void Recorder::fail_with(const Error& error) {
@@ -325,7 +327,7 @@ Status Recorder::close() {
   if (lessons_left_out_ > 0)
     log::warn("recording: the last {} things that people said or showed are missing",
               lessons_left_out_);
-  const Status closed = is_finished_ ? Status{} : writer_->close();
+  const Status closed = is_finished_ ? Status{} : close_file();
   if (status_.ok() && !closed.ok()) fail_with(closed.error());
   counters_.bytes_written = writer_->bytes_written();
   return status_;

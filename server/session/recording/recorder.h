@@ -31,6 +31,7 @@
 
 #include "common/base/spsc_queue.h"
 #include "common/journal/session_journal_writer.h"
+#include "common/secure/signing.h"
 #include "common/wire/hand_report.h"
 #include "common/wire/lesson.h"
 #include "common/wire/recording_state.h"
@@ -58,6 +59,7 @@ struct Beginning {
   bool has_implicit_strain = false;                // of a scenario, see journal::SessionInfo
   std::optional<journal::Continuation> continues;  // with which journal's session it goes on
   std::optional<bleeding::Rules> bleeding;         // of a session that bleeds
+  std::optional<secure::SigningKey> key;           // signs the recording at its end
 };
 
 class Recorder {
@@ -121,7 +123,8 @@ class Recorder {
   };
 
   Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
-           std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick);
+           std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick,
+           std::optional<secure::SigningKey> key);
   void run();
   // Writes everything queued; false when all queues were empty.
   bool write_queued();
@@ -134,6 +137,7 @@ class Recorder {
   void fail_with(const Error& error);
   // Writes what a whole file ends with.
   Status finish_file();
+  Status close_file() { return writer_->close(key_ ? &*key_ : nullptr); }
   Tick not_before_last(Tick tick) { return last_tick_ = std::max(last_tick_, tick); }
 
   // Writer thread, or the caller's after it has ended.
@@ -143,6 +147,7 @@ class Recorder {
   OverviewBuilder overview_;
   Tick last_tick_ = 0;
   std::uint64_t organ_hash_ = 0;
+  const std::optional<secure::SigningKey> key_;
   RecorderCounters counters_;
   Status status_;
   std::atomic<bool> has_failed_{false};  // status_ is an error, and changes no more

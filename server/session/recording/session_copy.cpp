@@ -72,7 +72,7 @@ Status SessionCopy::write_metadata(const journal::McapMetadata& metadata) {
 
 Status SessionCopy::copy_metadata(const journal::McapReader& reader, bool keeps_repair) {
   for (const auto& metadata : reader.metadata()) {
-    if (metadata.name == journal::kSessionMetadataName) continue;
+    if (metadata.name == journal::kSessionMetadataName || journal::is_of_end(metadata)) continue;
     if (metadata.name == journal::kRepairedMetadataName && !keeps_repair) continue;
     if (!noted_.emplace(metadata.name, metadata.entries).second) continue;
     if (auto written = writer_->write_metadata(metadata); !written) return written;

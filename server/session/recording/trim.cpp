@@ -11,6 +11,7 @@
 #include "common/base/checksum.h"
 #include "common/base/version.h"
 #include "common/journal/mcap_reader.h"
+#include "common/journal/recording_end.h"
 #include "common/wire/surface_messages.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
@@ -251,6 +252,7 @@ Result<TrimReport> trim(const std::string& from_path, const std::string& to_path
   auto info = (*journal)->info();
   if (info.has_external_loads || info.starts_from_snapshot)
     return refused_trim(from_path, "is of a scenario, which is run again for a shorter recording");
+  if (auto right = journal::refuse_wrong_end(**reader); !right) return right.error();
   const auto cut = find_cut(**journal, from_path, options);
   if (!cut) return cut.error();
   TrimReport report{.from = cut->begin, .to = cut->end};

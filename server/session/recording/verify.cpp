@@ -108,14 +108,20 @@ Result<VerifyReport> verify_journal(const std::string& path,
                     "simulated again, only its surfaces were decoded",
                     info.sim_version, kSimVersion));
   // Damage is known before anything is compared: lists of participants may be among it.
-  const auto whole = (*journal)->read_all([](auto, Tick, BytesView) { return true; });
+  const auto end = (*journal)->check_end();
+  const auto& whole = end.read;
   report.damaged_chunks = whole.damaged_chunks;
+  const bool is_changed = end.status == journal::EndStatus::Wrong;
   if (whole.damaged_chunks > 0)
     report.reasons.push_back(fmt::format("{} damaged chunks, the first: {}", whole.damaged_chunks,
                                          whole.first_damage.message));
+  else if (is_changed)
+    report.reasons.push_back(end.text);
   else if (Status data = (*journal)->container().check_data_crc(); !data.ok())
     report.reasons.push_back(data.error().message);
-  if (!info.is_finished) report.reasons.push_back("it has no end: " + report.container);
+  if (end.status == journal::EndStatus::Unpromised) report.reasons.push_back(end.text);
+  if (!info.is_finished && (!is_changed || whole.damaged_chunks > 0))
+    report.reasons.push_back("it has no end: " + report.container);
 
   std::optional<dynamics::StrainScheme> scheme;
   if (info.has_implicit_strain) scheme = dynamics::StrainScheme::Implicit;
@@ -127,7 +133,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
                                                      verifier.add_list(tick, list);
                                                      return true;
                                                    });
-  verifier.set_all_lists(lists.ok() && info.is_finished && whole.damaged_chunks == 0);
+  verifier.set_all_lists(lists.ok() && info.is_finished && !is_changed);
   Tick next_progress = kProgressPeriod;
   (*journal)->read_all([&](std::string_view topic, Tick tick, BytesView bytes) {
     if (progress && tick >= next_progress) {

@@ -20,7 +20,8 @@
 //
 // The verdict is Verified only if all of that was there and equal from the first tick to the last.
 // A difference ends the comparison. Everything else that keeps the verdict from being Verified is a
-// reason: another sim_version, ticks or messages that are missing, damaged chunks, no proper end.
+// reason: another sim_version, ticks or messages that are missing, damaged chunks, no proper end,
+// an end that counts or hashes to other messages.
 // After missing ticks the simulation goes on from the next snapshot.
 
 #include <functional>
