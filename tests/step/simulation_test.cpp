@@ -226,46 +226,5 @@ TEST(Decisions, OutOfRangeIsRefusedByName) {
   EXPECT_FALSE(validate({.depth_limit = 5000}).ok());
 }
 
-// A thin tip stops at the greatest pressure before it is where the hand is. Held still there, the
-// force on it is as steady as that of a thicker one.
-TEST(Simulation, AThinTipThatIsHeldStillDoesNotBuzz) {
-  const auto organ = *catalogue::make_liver();
-  const Vec3f out = normalized(Vec3f{-1, 0.15f, 0.7f}, {});
-  Vec3f place;
-  for (const auto& p : organ.mesh.rest_positions)
-    if (dot(to_float(p), out) > dot(place, out)) place = to_float(p);
-  for (const float radius_m : {0.002f, 0.005f}) {
-    SCOPED_TRACE(radius_m);
-    Simulation simulation(organ);
-    const ToolSlot tool = tool_slot({0}, 0);
-    std::vector<float> changes;
-    Vec3f last;
-    for (Tick tick = 1; tick <= 500; ++tick) {
-      hands::TickInputs inputs;
-      if (tick == 1) {
-        hands::HandJoin join{.slot = {0}};
-        join.shapes[0] = {.radius_m = radius_m, .length_m = 0.3f};
-        inputs.joins.push_back(join);
-      }
-      const float depth_m = std::min(0.005f, 0.06e-3f * static_cast<float>(tick) - 0.001f);
-      if (tick % 8 == 1)
-        inputs.samples.push_back(
-            {tool, {{place - out * depth_m, rotation_from_z(out)}, tool::Verb::Push}});
-      simulation.tick(inputs, {});
-      const auto& found = simulation.context().contact.found;
-      Vec3f now;
-      for (const auto& contact : found.tools)
-        now += contact::reaction_on(found, contact, simulation.state().world).force_n;
-      if (tick > 140) changes.push_back(length(now - last) / length(now));
-      last = now;
-    }
-    std::ranges::nth_element(changes, changes.begin() + changes.size() / 2);
-    const float median = changes[changes.size() / 2];
-    std::printf("radius %.0f mm: %.2f N, changes by %.2f %% in a tick (median)\n", radius_m * 1e3f,
-                length(last), 100 * median);
-    EXPECT_LT(median, 0.005f);
-  }
-}
-
 }  // namespace
 }  // namespace trocar::step

@@ -65,21 +65,9 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
       proxy.pose.orientation = tool.start.orientation;
     }
   }
-  const auto nearer_by = [&](const Vec3f& moved) {
-    const Pose there{tool.goal.position + moved, proxy.pose.orientation};
-    return std::max(0.0f, way_between(tool.start, hand.pose, hand.shape) -
-                              way_between(there, hand.pose, hand.shape));
-  };
-  // Where a tool is stopped at the greatest pressure, planes under a small tip lead it to and fro
-  // across its way. It stays, but for what brings it nearer: between two places outside all planes
-  // it is outside, too.
-  if (!proxy.point_ids.empty() && way_between(tool.goal, hand.pose, hand.shape) > 0) {
-    const auto stay = depenetrate(planes, tool.start.position - tool.goal.position);
-    const float part = std::min(1.0f, nearer_by(out.moved) / tool.softness_m);
-    if (stay.depth <= kOutside_m) out.moved = stay.moved + (out.moved - stay.moved) * part;
-  }
   proxy.pose.position += out.moved;
-  const float walked = nearer_by(out.moved);
+  const float walked = std::max(0.0f, way_between(tool.start, hand.pose, hand.shape) -
+                                          way_between(proxy.pose, hand.pose, hand.shape));
   proxy.step_m = kFaster * walked + (proxy.point_ids.empty() ? kFree_m : kDeeper * tool.softness_m);
 }
 
