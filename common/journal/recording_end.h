@@ -5,9 +5,9 @@
 // It is metadata that the writer puts before the summary; metadata trocar.session promises it.
 //
 //   trocar.end        messages          how many there are
-//                     messages_sha256   of topic, log_time, publish_time and bytes of each, in
-//                     order metadata_sha256   of all other metadata, in order /topic            how
-//                     many there are on that channel
+//                     /topic            how many there are on that channel
+//                     messages_sha256   of topic, log_time, publish_time and bytes, in order
+//                     metadata_sha256   of all other metadata, in order
 //   trocar.signature  ed25519           of signed_bytes(end), in hexadecimal
 //                     public_key        by which it can be checked; nothing says whose that is
 //
