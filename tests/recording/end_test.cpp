@@ -197,7 +197,7 @@ TEST_F(RecordingEnd, IsRightInWhatIsMadeOfRecordings) {
   ASSERT_EQ(run({"repair", at("killed.mcap"), at("whole.mcap")}), 0) << log();
   EXPECT_EQ(status_of(at("whole.mcap")), EndStatus::Right);
   EXPECT_EQ(run({"verify", at("whole.mcap")}), kNotVerified) << "it says that it was repaired";
-  // That cannot be taken out, either.
+  // Nobody can take that out, either.
   forge(at("whole.mcap"), at("healed.mcap"), kAllMessages, [](const McapMetadata& metadata) {
     return metadata.name != std::string("trocar.repaired");
   });

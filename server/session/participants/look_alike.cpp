@@ -27,7 +27,7 @@ icu::UnicodeString without_unseen(const icu::UnicodeString& text) {
   return seen;
 }
 
-// What ICU cannot do, because its data are missing, leaves the name as it is.
+// The name stays as it is if ICU has no data.
 icu::UnicodeString skeleton_of(std::string_view name) {
   const auto text =
       icu::UnicodeString::fromUTF8({name.data(), static_cast<std::int32_t>(name.size())});

@@ -40,10 +40,10 @@ struct Places {
   float longest_edge_mm = 40;  // of a blade: what it cuts in a tick is in proportion
 };
 
-// So many of who watch may have that role: observers leave places to who leads, and instructors
-// half of all to who looks on.
+// Returns how many people of a role that watches there may be: observers leave places to who leads,
+// and instructors half of all to who looks on.
 int places_for(Role role, const Places& places);
-// So many of these with one code from one address.
+// Returns how many of them may come with one code from one address.
 int places_alike(Role role, const Places& places);
 
 // 1 to 32 bytes of printable UTF-8 without a space at either end.
