@@ -15,7 +15,7 @@ constexpr const char* kMessageHash = "messages_sha256";
 constexpr const char* kMetadataHash = "metadata_sha256";
 constexpr const char* kSignature = "ed25519";
 constexpr const char* kPublicKey = "public_key";
-// What is signed begins with it, so that no signature of anything else counts.
+// The signed bytes begin with it, so that no signature of anything else counts.
 constexpr std::string_view kSignedHere = "trocar-recording-1\n";
 
 using Counts = std::map<std::string, std::uint64_t, std::less<>>;
@@ -66,7 +66,7 @@ std::string differing(const McapMetadata& end, const Counts& counts) {
   return number_of(said) == all ? std::string() : changed(kMessages, all, said);
 }
 
-// What can be said without looking at messages; nothing: there is an end to compare with.
+// Says what is known without looking at messages; nothing: there is an end to compare with.
 std::optional<EndReport> without_end(const McapReader& reader) {
   if (only(reader, kEndMetadataName) != nullptr) return std::nullopt;
   const auto* session = only(reader, kSessionMetadataName);

@@ -19,6 +19,7 @@ pkg_check_modules(avahi REQUIRED avahi-client)
 pkg_check_modules(curl REQUIRED IMPORTED_TARGET libcurl)
 # Halls do without it.
 pkg_check_modules(nats IMPORTED_TARGET libnats)
+pkg_check_modules(icu REQUIRED IMPORTED_TARGET icu-i18n icu-uc)
 pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(xxhash REQUIRED IMPORTED_TARGET libxxhash)
 if(TROCAR_CLIENT)

@@ -125,6 +125,26 @@ TEST(Access, one_observers_code_does_not_take_all_places) {
   EXPECT_TRUE(try_to_join(guarded, "Ivy", Role::Instructor, guarded.code(Role::Instructor)).is_in);
 }
 
+TEST(Access, one_instructors_code_does_not_take_all_places) {
+  replication::ReplicatorOptions few;
+  few.places = {.watchers = 10};
+  GuardedSession guarded(-1, tls_options(), few);
+  guarded.session->publish(10);
+  std::vector<std::unique_ptr<net::NetSource>> crowd;
+  for (int i = 0; i < 3; ++i) {
+    Collector sink;
+    auto& one = *crowd.emplace_back(std::make_unique<net::NetSource>(
+        options_for(guarded.session->port(), "instructor " + std::to_string(i), Role::Instructor,
+                    guarded.code(Role::Instructor))));
+    ASSERT_TRUE(poll_until(one, sink, [&] { return one.state() == SourceState::Live; }));
+  }
+  const auto late = try_to_join(guarded, "late", Role::Instructor, guarded.code(Role::Instructor));
+  EXPECT_EQ(late.reason, proto::GOODBYE_FULL);
+  EXPECT_NE(late.text.find("3 instructors with this code"), std::string::npos) << late.text;
+  EXPECT_TRUE(try_to_join(guarded, "Ada", Role::Surgeon, guarded.code(Role::Surgeon)).is_in);
+  EXPECT_TRUE(try_to_join(guarded, "Otto", Role::Observer, guarded.code(Role::Observer)).is_in);
+}
+
 TEST(Access, frames_larger_than_a_record_of_tls_arrive_whole) {
   GuardedSession guarded;
   auto tcp = tls_options();

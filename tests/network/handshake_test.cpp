@@ -254,6 +254,48 @@ TEST(Handshake, observers_leave_room_for_who_leads) {
   EXPECT_TRUE(instructor.join("Ivy", proto::ROLE_INSTRUCTOR));
 }
 
+TEST(Handshake, instructors_leave_half_of_the_places_to_who_looks_on) {
+  replication::ReplicatorOptions options;
+  options.places = {.watchers = 10};
+  LiveSession session({}, options);
+  std::vector<std::unique_ptr<RawClient>> instructors;
+  for (int i = 0; i < 5; ++i) {
+    instructors.push_back(std::make_unique<RawClient>(session.port()));
+    ASSERT_TRUE(
+        instructors.back()->join("instructor " + std::to_string(i), proto::ROLE_INSTRUCTOR));
+  }
+  const auto refused = refusal_of(session, make_hello("late", proto::ROLE_INSTRUCTOR));
+  EXPECT_EQ(refused.reason(), proto::GOODBYE_FULL);
+  EXPECT_NE(refused.text().find("all 5 places for instructors"), std::string::npos)
+      << refused.text();
+  RawClient observer(session.port()), surgeon(session.port());
+  EXPECT_TRUE(observer.join("Otto", proto::ROLE_OBSERVER));
+  EXPECT_TRUE(surgeon.join("Ada", proto::ROLE_SURGEON));
+}
+
+TEST(Handshake, names_that_look_alike_are_not_here_at_the_same_time) {
+  LiveSession session;
+  RawClient first(session.port());
+  ASSERT_TRUE(first.join("Anna O 1", proto::ROLE_SURGEON));
+  for (const std::string& name :
+       {std::string("\xd0\x90nna O 1"),       // Cyrillic A
+        std::string("Ann\xce\xb1 O 1"),       // Greek alpha
+        std::string("\xef\xbc\xa1nna O 1"),   // full width
+        std::string("A\xef\xb8\x8fnna O 1"),  // a variation selector, which is not seen
+        std::string("Anna\xc2\xa0O 1"),       // a space that does not break
+        std::string("Anna  O 1"), std::string("Anna 0 1"), std::string("Anna O l")}) {
+    const auto refused = refusal_of(session, make_hello(name, proto::ROLE_OBSERVER));
+    EXPECT_EQ(refused.reason(), proto::GOODBYE_NAME_TAKEN) << name;
+    EXPECT_NE(refused.text().find("somebody called Anna O 1, which looks like " + name),
+              std::string::npos)
+        << refused.text();
+  }
+  for (const char* name : {"anna O 1", "Anna O 2", "Ann\xc3\xa4 O 1", "AnnaO 1"}) {
+    RawClient other(session.port());
+    EXPECT_TRUE(other.join(name, proto::ROLE_OBSERVER)) << name;
+  }
+}
+
 TEST(Handshake, when_many_come_at_once_those_who_are_here_are_told_once) {
   std::atomic<std::uint64_t> clock_ns{1'000'000'000};
   replication::ReplicatorOptions options;

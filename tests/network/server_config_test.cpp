@@ -93,6 +93,16 @@ TEST_F(ServerConfig, TheExampleMayBeUsedInFull) {
   EXPECT_EQ((*options)->limits.places.watchers, 100);
 }
 
+TEST_F(ServerConfig, AKeyToSignWithIsReadBeforeTheSession) {
+  const auto missing = at("missing.pem"), text = write("text.pem", "no key\n");
+  expect_fault("sign = '" + missing + "'\n", ":1: key sign: ", "cannot be read");
+  expect_fault("sign = '" + text + "'\n",
+               ":1: key sign: ", "is no private Ed25519 key in PEM form");
+  expect_fault("journal = 'none'\nsign = '" + text + "'\n", ":2: key sign: ", "nothing to sign");
+  EXPECT_EQ(run({"--journal", at("new.mcap"), "--sign", text, "--listen", "127.0.0.1:0"}), 3);
+  EXPECT_FALSE(std::filesystem::exists(at("new.mcap")));
+}
+
 TEST_F(ServerConfig, ValuesAreThoseOfTheFileUnlessTheyAreTyped) {
   const auto file = write("a.toml",
                           "organ = 'plate'\nlisten = \"[::1]:9\"\nkeep-codes = true # really\n"

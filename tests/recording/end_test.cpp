@@ -13,9 +13,11 @@
 #include "common/journal/mcap_writer.h"
 #include "common/journal/recording_end.h"
 #include "common/journal/session_journal.h"
-#include "server/session/recording/anonymise.h"
-#include "server/session/recording/trim.h"
+#include "common/secure/signing.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/recording/recorder.h"
 #include "server/session/recording/verify.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/recording/recorded_simulation.h"
 #include "tests/support/files.h"
 #include "tests/support/program_fixture.h"
@@ -195,7 +197,7 @@ TEST_F(RecordingEnd, IsRightInWhatIsMadeOfRecordings) {
   ASSERT_EQ(run({"repair", at("killed.mcap"), at("whole.mcap")}), 0) << log();
   EXPECT_EQ(status_of(at("whole.mcap")), EndStatus::Right);
   EXPECT_EQ(run({"verify", at("whole.mcap")}), kNotVerified) << "it says that it was repaired";
-  // That cannot be taken out, either.
+  // Nobody can take that out, either.
   forge(at("whole.mcap"), at("healed.mcap"), kAllMessages, [](const McapMetadata& metadata) {
     return metadata.name != std::string("trocar.repaired");
   });
@@ -242,10 +244,13 @@ TEST_F(RecordingEnd, IsSignedByARecorderThatHasAKey) {
   const auto known = secure::read_public_key(at("a.pub"));
   ASSERT_TRUE(key.ok() && known.ok());
   EXPECT_EQ(key->public_key(), *known);
-  auto writer = journal::SessionJournalWriter::create(
-      at("small.mcap"), {.start_utc_ns = 1, .organ_name = "liver", .organ_hash = 1});
-  ASSERT_TRUE(writer.ok());
-  ASSERT_TRUE((*writer)->close(&*key).ok());
+  const step::Simulation simulation(*catalogue::make_liver(800));
+  Beginning beginning;
+  beginning.key = *key;
+  auto recorder =
+      Recorder::create(at("small.mcap"), simulation.organ(), simulation.layout(), beginning);
+  ASSERT_TRUE(recorder.ok());
+  ASSERT_TRUE((*recorder)->close().ok());
   auto reader = journal::McapReader::open(at("small.mcap"));
   ASSERT_TRUE(reader.ok());
   EXPECT_TRUE(journal::check_signature(**reader, *known, "a.pub").ok());

@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "common/base/printable.h"
+#include "server/session/participants/look_alike.h"
 
 namespace trocar::participants {
 namespace {
@@ -16,6 +17,12 @@ int kept_for_instructors(int watchers) {
   return watchers < 2 ? 0 : std::max(1, watchers / 10);
 }
 
+// Who has asked for a name finds the other one in the list.
+std::string called(std::string_view name, const Participant& other) {
+  const auto whole = "somebody called " + other.name;
+  return other.name == name ? whole : whole + ", which looks like " + std::string(name) + ",";
+}
+
 std::string print_mm(float mm) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), mm);
@@ -23,6 +30,15 @@ std::string print_mm(float mm) {
 }
 
 }  // namespace
+
+int places_for(Role role, const Places& places) {
+  if (role == Role::Observer) return places.watchers - kept_for_instructors(places.watchers);
+  return (places.watchers + 1) / 2;
+}
+
+int places_alike(Role role, const Places& places) {
+  return role == Role::Observer ? (places.watchers + 1) / 2 : (places.watchers + 3) / 4;
+}
 
 bool is_valid_name(std::string_view name) {
   if (name.empty() || name.size() > kMaxNameBytes) return false;
@@ -75,10 +91,10 @@ Result<Participant> Roster::join(std::string_view name, Role role,
   for (const auto& shape : tools)
     if (auto checked = check_shape(shape); !checked)
       return refuse(JoinRefusal::ToolsInvalid, checked.error().message);
-  if (const auto* other = find(name))
+  if (const auto* other = find_alike(name))
     return refuse(
         JoinRefusal::NameTaken,
-        "name: somebody called " + std::string(name) +
+        "name: " + called(name, *other) +
             (other->is_away ? " has lost the connection, and the place is kept for a while"
                             : " is here already") +
             ", choose another with --name");
@@ -86,16 +102,19 @@ Result<Participant> Roster::join(std::string_view name, Role role,
 
   const bool has_hands = !tools.empty();
   const auto first = slots_.begin() + (has_hands ? 0 : kMaxHands);
-  const int kept = role == Role::Observer ? kept_for_instructors(places_.watchers) : 0;
-  const int places = has_hands ? places_.hands : places_.watchers - kept;
-  const auto last = first + places;
+  const auto last = first + (has_hands ? places_.hands : places_.watchers);
   const auto free = std::find_if(first, last, [](const auto& slot) { return !slot; });
-  if (free == last)
-    return refuse(JoinRefusal::Full, "full: all " + std::to_string(places) +
-                                         (has_hands ? " places with tools are taken, join as "
-                                                      "observer or come back"
-                                                    : " places for watchers are taken, come "
-                                                      "back later"));
+  const auto alike =
+      std::count_if(first, last, [role](const auto& slot) { return slot && slot->role == role; });
+  const int places = has_hands ? places_.hands : places_for(role, places_);
+  if (free == last || alike >= places)
+    return refuse(JoinRefusal::Full,
+                  "full: all " + std::to_string(places) +
+                      (has_hands                ? " places with tools are taken, join as "
+                                                  "observer or come back"
+                       : role == Role::Observer ? " places for watchers are taken, come back later"
+                                                : " places for instructors are taken, join as "
+                                                  "observer or come back later"));
   const auto index = static_cast<std::uint8_t>(free - slots_.begin());
   *free = Participant{
       .slot = {index}, .name = std::string(name), .role = role, .tools = std::move(tools)};
@@ -117,6 +136,13 @@ const Participant* Roster::find(ParticipantSlot slot) const {
 const Participant* Roster::find(std::string_view name) const {
   for (const auto& slot : slots_)
     if (slot && slot->name == name) return &*slot;
+  return nullptr;
+}
+
+const Participant* Roster::find_alike(std::string_view name) const {
+  if (const auto* same = find(name)) return same;
+  for (const auto& slot : slots_)
+    if (slot && look_alike(slot->name, name)) return &*slot;
   return nullptr;
 }
 
@@ -147,9 +173,9 @@ void Roster::set_leader(ParticipantSlot slot) {
 
 Status Roster::rename(ParticipantSlot slot, std::string_view name) {
   if (!is_valid_name(name)) return Error{ErrorCode::Refused, kNameRule};
-  const auto* other = find(name);
-  if (other != nullptr && other->slot != slot)
-    return Error{ErrorCode::Refused, "name: somebody else is called " + std::string(name)};
+  for (const auto& other : slots_)
+    if (other && other->slot != slot && look_alike(other->name, name))
+      return Error{ErrorCode::Refused, "name: " + called(name, *other) + " is here already"};
   if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->name = name;
   return {};
 }

@@ -40,6 +40,12 @@ struct Places {
   float longest_edge_mm = 40;  // of a blade: what it cuts in a tick is in proportion
 };
 
+// Returns how many people of a role that watches there may be: observers leave places to who leads,
+// and instructors half of all to who looks on.
+int places_for(Role role, const Places& places);
+// Returns how many of them may come with one code from one address.
+int places_alike(Role role, const Places& places);
+
 // 1 to 32 bytes of printable UTF-8 without a space at either end.
 bool is_valid_name(std::string_view name);
 inline constexpr const char* kNameRule =
@@ -54,8 +60,8 @@ class Roster {
   explicit Roster(const std::vector<Participant>& present);
 
   // Admits a participant into the lowest free slot of its kind, or says why not. `refusal` is set
-  // on error. A name is 1 to 32 bytes of printable UTF-8 and unique; a role with tools that names
-  // none gets one default tool; a role without tools may not bring any.
+  // on error. A name is 1 to 32 bytes of printable UTF-8, and looks like no other; a role with
+  // tools that names none gets one default tool; a role without tools may not bring any.
   Result<Participant> join(std::string_view name, Role role, std::vector<tool::ToolShape> tools,
                            JoinRefusal& refusal);
   // The participant takes this instrument; an error: no such tool, or the shape may not be here.
@@ -69,7 +75,7 @@ class Roster {
   void set_lent(ToolSlot tool, bool is_lent);
   // Nobody else leads then; an invalid slot: nobody at all.
   void set_leader(ParticipantSlot slot);
-  // An error if the name is not valid, or somebody else has it.
+  // An error if the name is not valid, or somebody else has one that looks like it.
   Status rename(ParticipantSlot slot, std::string_view name);
 
   const Participant* find(ParticipantSlot slot) const;
@@ -77,6 +83,7 @@ class Roster {
   std::vector<Participant> list() const;  // by slot
 
  private:
+  const Participant* find_alike(std::string_view name) const;
   Status check_shape(const tool::ToolShape& shape) const;
 
   Places places_;

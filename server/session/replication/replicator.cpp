@@ -343,20 +343,22 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
 std::optional<Replicator::Ending> Replicator::find_place(Client& client, HelloRequest& request) {
   // Who got hold of one code does not take all places with it. A carrier's guests share its
   // address.
-  const auto is_alike = [&client](const Client& other) {
-    return other.participant && other.carrier == 0 &&
-           other.participant->role == participants::Role::Observer &&
+  const auto is_alike = [&](const Client& other) {
+    return other.participant && other.carrier == 0 && other.participant->role == request.role &&
            other.applicant.code == client.applicant.code &&
            access::counted_as(other.applicant.address) ==
                access::counted_as(client.applicant.address);
   };
-  const auto most_alike = (options_.places.watchers + 1) / 2;
-  if (options_.gate && client.carrier == 0 && request.role == participants::Role::Observer &&
-      std::ranges::count_if(clients_, [&](const auto& one) { return is_alike(*one.second); }) >=
-          most_alike)
-    return Ending{EndReason::Full, "full: " + std::to_string(most_alike) +
-                                       " observers with this code watch from your address, come "
-                                       "back later"};
+  const auto most_alike = participants::places_alike(request.role, options_.places);
+  const bool is_bounded =
+      options_.gate && client.carrier == 0 && !participants::has_tools(request.role);
+  if (is_bounded && std::ranges::count_if(clients_, [&](const auto& one) {
+                      return is_alike(*one.second);
+                    }) >= most_alike)
+    return Ending{EndReason::Full, "full: " + std::to_string(most_alike) + " " +
+                                       text_of_role(request.role) +
+                                       "s with this code are here from your address, come back "
+                                       "later"};
   auto refusal = participants::JoinRefusal::Full;
   auto joined = roster_.join(request.name, request.role, std::move(request.tools), refusal);
   if (!joined) return Ending{reason_of(refusal, request.role), joined.error().message};
