@@ -148,7 +148,7 @@ class Scene {
   Vec3f middle() const { return (low_ + high_) * 0.5f; }
   float number(double low, double high) { return static_cast<float>(random_.between(low, high)); }
 
-  // A node of the surface, farthest in a direction.
+  // Returns the node of the surface that is farthest in a direction.
   Vec3f farthest(const Vec3f& direction) const {
     const auto& world = simulation_.state().world;
     NodeIndex best = world.surface_nodes.front();
@@ -202,7 +202,7 @@ class Scene {
       go(i, {ends[i], shaft}, tool::Verb::None, 0);
       go(i, {ends[i], shaft}, tool::Verb::Grasp, 0.05f);
       constexpr int kSteps = 16;
-      // As fast as the speed is at the edge of what the jaws hold.
+      // The edge of what the jaws hold goes at the speed.
       const float seconds = std::max(angle * 0.01f, stretch) / speed_;
       for (int k = 1; k <= kSteps; ++k) {
         const float share = static_cast<float>(k) / kSteps;

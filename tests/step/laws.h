@@ -16,7 +16,7 @@ struct LawFigures {
   double speed = 0;
   // In a row, of one tet: without tools, and with them (jaws may hold a tet inside out).
   int inverted_ticks = 0, inverted_held_ticks = 0;
-  // What energy, kinetic and potential, has grown by without tools, over what it was at first.
+  // Energy, kinetic and potential, has grown by so much without tools, over what it was at first.
   double growth = 0;
   double drift_m_s = 0;  // of the centre of mass of what nothing holds, without tools
 };

@@ -159,7 +159,7 @@ void EdgeMeter::meet(const std::array<Vec3d, 4>& corners, TetIndex tet, const Ve
 std::array<Vec3d, 2> EdgeMeter::tissue_motion(const topology::Topology& topology,
                                               std::span<const Vec3f> velocities) const {
   if (velocities.empty()) return {};
-  // Of the edge's length, squared: what lies in less than about a tenth tells no slope.
+  // A part of the edge that is less than about a tenth of it tells no slope; this is squared.
   constexpr double kLeastSpread = 5e-4;
   const auto velocity_of = [&](const Sample& sample) {
     Vec3d velocity;

@@ -20,7 +20,7 @@ class BladeMotion {
 
   // h: m. Appeared: another blade, or one that has jumped: a stroke of its own has to begin.
   Verdict move(std::span<const Vec3d> points, double h, const Settings& settings);
-  // What has not been cut yet moves with the tissue: so far, m, at either end of the edge.
+  // Moves what has not been cut yet with the tissue: so far, m, at either end of the edge.
   void carry(const std::array<Vec3d, 2>& moved);
   // Makes a strip of the collected motion that is left.
   void finish(double h, const Settings& settings);

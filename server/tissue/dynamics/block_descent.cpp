@@ -43,7 +43,7 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::size_t kUsualSweeps = 64;
 // If a node's step was not finite, the nodes within so many layers of it are restored with it.
 constexpr int kRestoredLayers = 3;
-// Of the inertia that would do for what is folded.
+// Folded domains have so many times the inertia that would do for them.
 constexpr float kCreep = 2;
 
 float sum(const Lanes& a) {
@@ -210,7 +210,7 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
     if (is_slow(group)) least *= 3 - 2 / static_cast<float>(far_interval_);
     const Float8 added =
         where(moves, _mm256_max_ps(fma8(nodal.stiffness, all(least), all(0) - inertia), all(0)));
-    // What creeps resists its motion, not the change of it.
+    // A node that creeps resists its motion, not the change of it.
     inertia = inertia + added + where(moves, nodal.creep * all(kCreep * least));
     momentum = fma8(ahead - start, added, momentum) - nodal.gradient;
   }

@@ -152,7 +152,7 @@ void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::Hapti
   } else if (!surface.is_known() || surface.has_changed(layout, place)) {
     if (surface.is_known()) {
       touch.structure = static_cast<std::uint32_t>(scene.world.tick);
-      // What a blade feels is no spring, and each step of it is another surface.
+      // A blade feels no spring, and each step of it is another surface.
       if (touch.kind == TouchKind::Grip) touch.stiffness.clear();
     }
     if (touch.kind == TouchKind::Cut) {
