@@ -1,8 +1,9 @@
 #pragma once
 
 // The end of a recording says what the whole holds: how many messages each channel has, and a
-// SHA-256 of all of them, so that a part which somebody took out is missed though the file was closed
-// anew. It is metadata that the writer puts before the summary; metadata trocar.session promises it.
+// SHA-256 of all of them, so that a part which somebody took out is missed though the file was
+// closed anew. It is metadata that the writer puts before the summary; metadata trocar.session
+// promises it.
 //
 //   trocar.end        messages          how many there are
 //                     /topic            how many there are on that channel
