@@ -317,7 +317,8 @@ TEST(BladeForce, ChangesGraduallyWhereABladeIsStopped) {
     std::printf("up to %.2f N, by %.3f N in a tick\n", most_n, most_step_n);
     EXPECT_GT(most_n, 4);
     EXPECT_LE(most_step_n, kMost_n + kRounding_n);
-    EXPECT_EQ(length(last), 0);
+    // Tissue that goes back where it was may still pull at a blade that stands in it.
+    EXPECT_LT(length(last), is_lifted ? 1e-9f : 0.05f);
   }
 }
 
