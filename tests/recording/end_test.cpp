@@ -95,18 +95,8 @@ class RecordingEnd : public trocar::testing::ProgramFixture {
  protected:
   RecordingEnd() : ProgramFixture("trocar-journal") {}
 
-  // Simulated once for all tests.
-  static const std::string& sound() {
-    static const TemporaryFolder folder;
-    static const std::string path = [] {
-      auto file = folder.file("sound.mcap");
-      record_simulation(file);
-      return file;
-    }();
-    return path;
-  }
   static std::uint64_t time_of(Tick tick) {
-    auto journal = journal::SessionJournal::open(sound());
+    auto journal = journal::SessionJournal::open(recorded_simulation());
     return journal::JournalTimes{(*journal)->info().start_utc_ns}.log_time(tick);
   }
   static EndStatus status_of(const std::string& path) {
@@ -122,19 +112,20 @@ class RecordingEnd : public trocar::testing::ProgramFixture {
 };
 
 TEST_F(RecordingEnd, OfASoundRecordingCountsWhatIsThere) {
-  auto reader = journal::McapReader::open(sound());
+  auto reader = journal::McapReader::open(recorded_simulation());
   ASSERT_TRUE(reader.ok());
   const auto& end = (*reader)->metadata().back();
   EXPECT_EQ(end.name, journal::kEndMetadataName);
   EXPECT_EQ(end.entries.at("/world/snapshot"), std::to_string(1 + std::size(kSnapshotTicks)));
   EXPECT_EQ(end.entries.at("messages"), std::to_string((*reader)->statistics().message_count));
-  EXPECT_EQ(status_of(sound()), EndStatus::Right);
+  EXPECT_EQ(status_of(recorded_simulation()), EndStatus::Right);
 }
 
 TEST_F(RecordingEnd, OfAShortenedRecordingIsWrong) {
   const auto path = at("short.mcap");
   const auto last = time_of(1600);
-  forge(sound(), path, [&](auto&, const McapMessage& message) { return message.log_time <= last; });
+  forge(recorded_simulation(), path,
+        [&](auto&, const McapMessage& message) { return message.log_time <= last; });
   expect_changed(path, "/claims: ");
   auto journal = journal::SessionJournal::open(path);
   ASSERT_TRUE(journal.ok());
@@ -146,21 +137,22 @@ TEST_F(RecordingEnd, IsMissedWhereItWasTakenOutToo) {
   const auto path = at("endless.mcap");
   const auto last = time_of(1600);
   forge(
-      sound(), path, [&](auto&, const McapMessage& message) { return message.log_time <= last; },
+      recorded_simulation(), path,
+      [&](auto&, const McapMessage& message) { return message.log_time <= last; },
       [](McapMetadata& metadata) { return metadata.name != journal::kEndMetadataName; });
   expect_changed(path, "the end that counts its messages was taken out");
 }
 
 TEST_F(RecordingEnd, OfARecordingWithoutItsSnapshotsIsWrong) {
   const auto path = at("no_snapshots.mcap");
-  forge(sound(), path,
+  forge(recorded_simulation(), path,
         [](const McapChannel& channel, auto&) { return channel.topic != "/world/snapshot"; });
   expect_changed(path, "/world/snapshot: 0 messages, the end of the recording counts 3");
 }
 
 TEST_F(RecordingEnd, MissesOtherTimesAndOtherMetadataAsWell) {
   const auto path = at("note.mcap");
-  forge(sound(), path, kAllMessages, [](McapMetadata& metadata) {
+  forge(recorded_simulation(), path, kAllMessages, [](McapMetadata& metadata) {
     if (metadata.name == journal::kSessionMetadataName) metadata.entries["organ_name"] = "kidney";
     return true;
   });
@@ -169,7 +161,7 @@ TEST_F(RecordingEnd, MissesOtherTimesAndOtherMetadataAsWell) {
 
 TEST_F(RecordingEnd, OfAnOlderVersionIsReadAndSaidToBeUnknown) {
   const auto path = at("older.mcap");
-  forge(sound(), path, kAllMessages, [](McapMetadata& metadata) {
+  forge(recorded_simulation(), path, kAllMessages, [](McapMetadata& metadata) {
     metadata.entries.erase(journal::kPromisedEnd);
     return metadata.name != journal::kEndMetadataName;
   });
@@ -185,12 +177,13 @@ TEST_F(RecordingEnd, OfAnOlderVersionIsReadAndSaidToBeUnknown) {
 }
 
 TEST_F(RecordingEnd, IsRightInWhatIsMadeOfRecordings) {
-  ASSERT_EQ(run({"anonymise", sound(), at("hidden.mcap")}), 0) << log();
+  ASSERT_EQ(run({"anonymise", recorded_simulation(), at("hidden.mcap")}), 0) << log();
   EXPECT_EQ(status_of(at("hidden.mcap")), EndStatus::Right);
   EXPECT_EQ(run({"verify", at("hidden.mcap")}), 0) << log();
-  ASSERT_EQ(run({"trim", sound(), at("part.mcap"), "--from", "1", "--to", "2"}), 0) << log();
+  ASSERT_EQ(run({"trim", recorded_simulation(), at("part.mcap"), "--from", "1", "--to", "2"}), 0)
+      << log();
   EXPECT_EQ(status_of(at("part.mcap")), EndStatus::Right);
-  auto bytes = load_file(sound());
+  auto bytes = load_file(recorded_simulation());
   bytes.resize(bytes.size() * 2 / 3);
   save_file(at("killed.mcap"), bytes);
   EXPECT_EQ(status_of(at("killed.mcap")), EndStatus::Unfinished);
@@ -207,7 +200,7 @@ TEST_F(RecordingEnd, IsRightInWhatIsMadeOfRecordings) {
 TEST_F(RecordingEnd, IsNotMadeRightByACopy) {
   const auto forged = at("short.mcap");
   const auto last = time_of(1600);
-  forge(sound(), forged,
+  forge(recorded_simulation(), forged,
         [&](auto&, const McapMessage& message) { return message.log_time <= last; });
   make_keys(at("a.pem"), at("a.pub"));
   EXPECT_EQ(run({"anonymise", forged, at("new.mcap")}), kBadFile);
@@ -222,7 +215,7 @@ TEST_F(RecordingEnd, IsNotMadeRightByACopy) {
 TEST_F(RecordingEnd, IsSignedAndCheckedByItsKey) {
   make_keys(at("a.pem"), at("a.pub"));
   const auto path = at("signed.mcap");
-  ASSERT_EQ(run({"sign", sound(), path, "--key", at("a.pem")}), 0) << log();
+  ASSERT_EQ(run({"sign", recorded_simulation(), path, "--key", at("a.pem")}), 0) << log();
   EXPECT_EQ(run({"verify", path, "--check", at("a.pub")}), 0) << log();
   EXPECT_NE(log().find("signed with the key of " + at("a.pub")), std::string::npos) << log();
   EXPECT_EQ(run({"verify", path}), 0) << log();
@@ -231,8 +224,8 @@ TEST_F(RecordingEnd, IsSignedAndCheckedByItsKey) {
   EXPECT_EQ(run({"verify", path, "--check", at("b.pub")}), kMismatch);
   EXPECT_NE(log().find("is signed with another key than that of " + at("b.pub")), std::string::npos)
       << log();
-  EXPECT_EQ(run({"verify", sound(), "--check", at("a.pub")}), kMismatch);
-  EXPECT_NE(log().find("sound.mcap: is not signed"), std::string::npos) << log();
+  EXPECT_EQ(run({"verify", recorded_simulation(), "--check", at("a.pub")}), kMismatch);
+  EXPECT_NE(log().find("recorded.mcap: is not signed"), std::string::npos) << log();
   // Who signs anew replaces the signature.
   ASSERT_EQ(run({"sign", path, at("again.mcap"), "--key", at("b.pem")}), 0) << log();
   EXPECT_EQ(run({"verify", at("again.mcap"), "--check", at("b.pub")}), 0) << log();
@@ -259,7 +252,7 @@ TEST_F(RecordingEnd, IsSignedByARecorderThatHasAKey) {
 TEST_F(RecordingEnd, OfASignedRecordingCannotBeMadeAnew) {
   make_keys(at("a.pem"), at("a.pub"));
   const auto path = at("signed.mcap"), forged = at("forged.mcap");
-  ASSERT_EQ(run({"sign", sound(), path, "--key", at("a.pem")}), 0) << log();
+  ASSERT_EQ(run({"sign", recorded_simulation(), path, "--key", at("a.pem")}), 0) << log();
   const auto expect_refusal = [&](const std::string& says) {
     EXPECT_EQ(run({"verify", forged, "--check", at("a.pub")}), kMismatch) << log();
     EXPECT_NE(log().find(says), std::string::npos) << log();
@@ -276,7 +269,7 @@ TEST_F(RecordingEnd, OfASignedRecordingCannotBeMadeAnew) {
     return true;
   });
   std::filesystem::remove(forged);
-  auto reader = journal::McapReader::open(sound());
+  auto reader = journal::McapReader::open(recorded_simulation());
   ASSERT_TRUE(reader.ok());
   journal::CopyOptions options;
   options.change = [](const McapChannel&, const McapMessage& message) {
@@ -304,12 +297,13 @@ TEST_F(RecordingEnd, NeedsAKeyThatIsOne) {
   make_keys(at("other.pem"), at("other.pub"), "X25519");
   save_file(at("text.pem"), bytes_of(std::string_view("no key\n")));
   for (const char* name : {"missing.pem", "text.pem", "other.pem", "a.pub"}) {
-    EXPECT_EQ(run({"sign", sound(), at("new.mcap"), "--key", at(name)}), kBadFile) << name;
+    EXPECT_EQ(run({"sign", recorded_simulation(), at("new.mcap"), "--key", at(name)}), kBadFile)
+        << name;
     EXPECT_NE(log().find(name), std::string::npos) << log();
     EXPECT_FALSE(std::filesystem::exists(at("new.mcap")));
   }
   for (const char* name : {"missing.pub", "text.pem", "other.pub", "a.pem"})
-    EXPECT_EQ(run({"verify", sound(), "--check", at(name)}), kBadFile) << name;
+    EXPECT_EQ(run({"verify", recorded_simulation(), "--check", at(name)}), kBadFile) << name;
   EXPECT_NE(log().find("is no public Ed25519 key"), std::string::npos) << log();
 }
 

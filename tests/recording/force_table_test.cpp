@@ -58,24 +58,14 @@ std::vector<Row> rows_of(const std::string& text) {
 class ForceTable : public trocar::testing::ProgramFixture {
  protected:
   ForceTable() : ProgramFixture("trocar-journal") {}
-
-  static const std::string& recording() {
-    static const TemporaryFolder folder;
-    static const std::string path = [] {
-      auto file = folder.file("felt.mcap");
-      record_simulation(file);
-      return file;
-    }();
-    return path;
-  }
 };
 
 TEST_F(ForceTable, HasARowForEachToolAndFrameWithWhatTheHandFeltAtThatPose) {
-  ASSERT_EQ(run({"export", recording(), "--forces", at("forces.csv")}), 0) << log();
+  ASSERT_EQ(run({"export", recorded_simulation(), "--forces", at("forces.csv")}), 0) << log();
   EXPECT_NE(log().find("450 rows"), std::string::npos) << log();
   const auto rows = rows_of(read(at("forces.csv")));
   ASSERT_EQ(rows.size(), 3 * kRecordedTicks / kTicksPerFrame);
-  auto journal = journal::SessionJournal::open(recording());
+  auto journal = journal::SessionJournal::open(recorded_simulation());
   ASSERT_TRUE(journal.ok());
   std::map<Tick, std::uint64_t> echo_us;
   ASSERT_TRUE((*journal)
@@ -112,10 +102,10 @@ TEST_F(ForceTable, HasARowForEachToolAndFrameWithWhatTheHandFeltAtThatPose) {
 }
 
 TEST_F(ForceTable, AReportOutOfItsRangesIsCountedAndKeepsARecordingFromBeingVerified) {
-  EXPECT_EQ(verify_journal(recording())->verdict(), Verdict::Verified)
+  EXPECT_EQ(verify_journal(recorded_simulation())->verdict(), Verdict::Verified)
       << "reports themselves do not disturb";
   bool is_changed = false;
-  copy_journal(recording(), at("copy.mcap"), [&](auto topic, auto& message) {
+  copy_journal(recorded_simulation(), at("copy.mcap"), [&](auto topic, auto& message) {
     if (topic == "/hands" && !std::exchange(is_changed, true))
       static_cast<proto::HandLog&>(message).mutable_report()->set_rate_hz(-1);
     return true;
@@ -133,17 +123,17 @@ TEST_F(ForceTable, AReportOutOfItsRangesIsCountedAndKeepsARecordingFromBeingVeri
 }
 
 TEST_F(ForceTable, SaysWhatIsWrong) {
-  EXPECT_EQ(run({"export", recording()}), 2);
+  EXPECT_EQ(run({"export", recorded_simulation()}), 2);
   EXPECT_EQ(run({"export", at("none.mcap"), "--forces", at("forces.csv")}), 3);
-  EXPECT_EQ(run({"export", recording(), "--forces", at("no/such/folder.csv")}), 5);
+  EXPECT_EQ(run({"export", recorded_simulation(), "--forces", at("no/such/folder.csv")}), 5);
   EXPECT_NE(log().find("--forces"), std::string::npos) << log();
   EXPECT_NE(log().find("No such file or directory"), std::string::npos) << log();
 }
 
 TEST_F(ForceTable, NoOutputTakesThePlaceOfARecordingOrOfTheOtherOne) {
-  const auto whole = read(recording());
+  const auto whole = read(recorded_simulation());
   const auto file = at("a.mcap");
-  std::filesystem::copy_file(recording(), file);
+  std::filesystem::copy_file(recorded_simulation(), file);
   for (const char* option : {"--forces", "--lesson"}) {
     EXPECT_EQ(run({"export", file, option, file}), 2);
     expect_line(option);
@@ -156,16 +146,16 @@ TEST_F(ForceTable, NoOutputTakesThePlaceOfARecordingOrOfTheOtherOne) {
 }
 
 TEST_F(ForceTable, AFullDiskIsNamedAsSuch) {
-  EXPECT_EQ(run({"export", recording(), "--forces", "/dev/full"}), 5);
+  EXPECT_EQ(run({"export", recorded_simulation(), "--forces", "/dev/full"}), 5);
   expect_line("No space left on device");
-  EXPECT_EQ(run({"export", recording(), "--forces", at("")}), 5);
+  EXPECT_EQ(run({"export", recorded_simulation(), "--forces", at("")}), 5);
   expect_line("Is a directory");
 }
 
 TEST_F(ForceTable, ALinkStaysOne) {
   write("target.csv", "old");
   std::filesystem::create_symlink(at("target.csv"), at("link.csv"));
-  ASSERT_EQ(run({"export", recording(), "--forces", at("link.csv")}), 0) << log();
+  ASSERT_EQ(run({"export", recorded_simulation(), "--forces", at("link.csv")}), 0) << log();
   EXPECT_TRUE(std::filesystem::is_symlink(at("link.csv")));
   EXPECT_TRUE(read(at("target.csv")).starts_with("time_s,"));
 }
@@ -173,7 +163,7 @@ TEST_F(ForceTable, ALinkStaysOne) {
 TEST_F(ForceTable, OutputThatNobodyGetsIsNoSuccess) {
   const std::string program = TROCAR_BINARY_DIR "/trocar-journal";
   for (const char* command : {"info", "info --json", "verify --json"}) {
-    const auto line = program + " " + command + " " + recording();
+    const auto line = program + " " + command + " " + recorded_simulation();
     const int code = std::system((line + " >/dev/full 2>" + at("said")).c_str());
     EXPECT_EQ(WEXITSTATUS(code), 5) << command;
     const auto said = read(at("said"));
@@ -185,8 +175,8 @@ TEST_F(ForceTable, OutputThatNobodyGetsIsNoSuccess) {
 
 TEST_F(ForceTable, AnOutputThatExistsIsOneCodeForAllCommands) {
   write("b.mcap", "mine");
-  EXPECT_EQ(run({"anonymise", recording(), at("b.mcap")}), 3);
-  EXPECT_EQ(run({"trim", recording(), at("b.mcap"), "--from", "0", "--to", "1"}), 3);
+  EXPECT_EQ(run({"anonymise", recorded_simulation(), at("b.mcap")}), 3);
+  EXPECT_EQ(run({"trim", recorded_simulation(), at("b.mcap"), "--from", "0", "--to", "1"}), 3);
   expect_line("b.mcap: exists already");
   EXPECT_EQ(read(at("b.mcap")), "mine");
 }

@@ -10,6 +10,7 @@
 #include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/recorder.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/support/files.h"
 
 namespace trocar::recording::testing {
 namespace {
@@ -121,6 +122,16 @@ void record_simulation(const std::string& path, Tick dropped_at, bool bleeds) {
   const Status closed = (*recorder)->close();
   ASSERT_TRUE(closed.ok()) << closed.error().message;
   ASSERT_EQ((*recorder)->state().frames_missing, dropped_at > 0 ? 1u : 0u);
+}
+
+const std::string& recorded_simulation() {
+  static const trocar::testing::TemporaryFolder folder;
+  static const std::string path = [] {
+    auto file = folder.file("recorded.mcap");
+    record_simulation(file);
+    return file;
+  }();
+  return path;
 }
 
 void copy_journal(const std::string& from, const std::string& to, const Edit& edit,

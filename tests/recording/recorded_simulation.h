@@ -30,6 +30,9 @@ inline constexpr Tick kFirstReportTick = 256;
 // dropped_at: a frame that is too large for the recorder's queue, or 0. bleeds: what is cut does.
 void record_simulation(const std::string& path, Tick dropped_at = 0, bool bleeds = false);
 
+// The file of a simulation that is recorded once in a process: to be read and copied only.
+const std::string& recorded_simulation();
+
 // A message of a recording while it is copied. False: it is left out.
 using Edit = std::function<bool(std::string_view topic, google::protobuf::Message& message)>;
 void copy_journal(const std::string& from, const std::string& to, const Edit& edit,

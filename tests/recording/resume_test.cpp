@@ -23,19 +23,9 @@ using trocar::testing::TemporaryFolder;
 
 class Resume : public ::testing::Test {
  protected:
-  // Simulated once for all tests.
-  static const std::string& whole() {
-    static const TemporaryFolder folder;
-    static const std::string path = [] {
-      auto file = folder.file("whole.mcap");
-      record_simulation(file);
-      return file;
-    }();
-    return path;
-  }
   // The first part of the file, as a killed server leaves it.
   std::string cut_off(double share) {
-    const auto bytes = load_file(whole());
+    const auto bytes = load_file(recorded_simulation());
     const auto path = folder_.file("cut.mcap");
     save_file(path, BytesView(bytes).first(
                         static_cast<std::size_t>(share * static_cast<double>(bytes.size()))));
@@ -49,7 +39,7 @@ class Resume : public ::testing::Test {
   }
   std::string copy(const Edit& edit, std::uint32_t sim_version = kSimVersion) {
     const auto path = folder_.file("copy.mcap");
-    copy_journal(whole(), path, edit, sim_version);
+    copy_journal(recorded_simulation(), path, edit, sim_version);
     return path;
   }
 
@@ -79,7 +69,7 @@ TEST_F(Resume, GoesOnInTheStateThatVerificationFinds) {
 TEST_F(Resume, GivesTheHashesThatTheSessionWouldHaveHad) {
   auto session = resume_session(cut_off(0.6), {});
   ASSERT_TRUE(session.ok()) << session.error().message;
-  auto journal = journal::SessionJournal::open(whole());
+  auto journal = journal::SessionJournal::open(recorded_simulation());
   ASSERT_TRUE(journal.ok());
   auto& simulation = session->simulation;
   Tick compared = 0;

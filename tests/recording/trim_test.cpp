@@ -30,16 +30,6 @@ const auto kAsItIs = [](auto, auto&) { return true; };
 
 class Trim : public ::testing::Test {
  protected:
-  // Simulated once for all tests.
-  static const std::string& whole() {
-    static const TemporaryFolder folder;
-    static const std::string path = [] {
-      auto file = folder.file("whole.mcap");
-      record_simulation(file);
-      return file;
-    }();
-    return path;
-  }
   void expect_refusal(const std::string& path, const TrimOptions& options,
                       const std::string& says) {
     const auto files = std::distance(fs::directory_iterator(folder_.file("")), {});
@@ -52,7 +42,7 @@ class Trim : public ::testing::Test {
   }
   // Returns the hash after a tick of the whole recording.
   static std::uint64_t hash_after(Tick tick) {
-    auto journal = journal::SessionJournal::open(whole());
+    auto journal = journal::SessionJournal::open(recorded_simulation());
     std::uint64_t hash = 0;
     EXPECT_TRUE(read_ticks(**journal, [&](const step::TickRecord& record, bool& stop) {
                   hash = record.state_hash;
@@ -67,7 +57,8 @@ class Trim : public ::testing::Test {
 };
 
 TEST_F(Trim, APartFromTheMiddleVerifiesByItself) {
-  const auto trimmed = trim(whole(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
+  const auto trimmed =
+      trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   EXPECT_TRUE(trimmed->has_state);
   EXPECT_LE(trimmed->from, kFrom);
@@ -86,30 +77,32 @@ TEST_F(Trim, APartFromTheMiddleVerifiesByItself) {
 }
 
 TEST_F(Trim, ItShowsWhatTheWholeRecordingShowsThere) {
-  const auto trimmed = trim(whole(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
+  const auto trimmed =
+      trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
-  auto expected = surfaces_of(whole());
+  auto expected = surfaces_of(recorded_simulation());
   std::erase_if(expected, [&](const auto& entry) {
     return entry.first <= trimmed->from || entry.first > trimmed->to;
   });
   EXPECT_EQ(surfaces_of(to_), expected);
   auto journal = journal::SessionJournal::open(to_),
-       before = journal::SessionJournal::open(whole());
+       before = journal::SessionJournal::open(recorded_simulation());
   ASSERT_TRUE(journal.ok() && before.ok());
   const auto& info = (*journal)->info();
   EXPECT_EQ(info.start_utc_ns, (*before)->info().start_utc_ns);
   EXPECT_EQ(info.participants.size(), 3u);
   ASSERT_TRUE(info.trimmed.has_value());
-  EXPECT_EQ(info.trimmed->file, "whole.mcap");
+  EXPECT_EQ(info.trimmed->file, "recorded.mcap");
   EXPECT_FALSE(info.continues.has_value());
   const auto parts = open_session_parts(to_);
   ASSERT_TRUE(parts.ok());
   EXPECT_EQ(parts->parts.size(), 1u);
-  EXPECT_NE(parts->missing.find("cut out of whole.mcap"), std::string::npos);
+  EXPECT_NE(parts->missing.find("cut out of recorded.mcap"), std::string::npos);
 }
 
 TEST_F(Trim, FromItsBeginningItIsTheSameRecording) {
-  const auto trimmed = trim(whole(), to_, {.from = 0, .to = 100'000, .reduction_file = {}});
+  const auto trimmed =
+      trim(recorded_simulation(), to_, {.from = 0, .to = 100'000, .reduction_file = {}});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   EXPECT_EQ(trimmed->to, kRecordedTicks);
   const auto report = verify_journal(to_);
@@ -117,7 +110,7 @@ TEST_F(Trim, FromItsBeginningItIsTheSameRecording) {
   EXPECT_EQ(report->verdict(), Verdict::Verified) << report->why();
   EXPECT_EQ(report->ticks_verified, kRecordedTicks);
   // Overviews are made anew from messages, and are those that were made from frames.
-  const auto anew = overviews_of(to_), recorded = overviews_of(whole());
+  const auto anew = overviews_of(to_), recorded = overviews_of(recorded_simulation());
   ASSERT_EQ(anew.size(), recorded.size());
   for (std::size_t i = 0; i < anew.size(); ++i)
     EXPECT_EQ(anew[i].SerializeAsString(), recorded[i].SerializeAsString())
@@ -137,7 +130,8 @@ TEST_F(Trim, ASessionThatBleedsVerifiesToo) {
 }
 
 TEST_F(Trim, ATrimmedRecordingCanBeTrimmedAndGoneOnWith) {
-  ASSERT_TRUE(trim(whole(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}}).ok());
+  ASSERT_TRUE(
+      trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}}).ok());
   const auto shorter = folder_.file("shorter.mcap");
   const auto trimmed = trim(to_, shorter, {.from = kFrom, .to = kFrom + 200, .reduction_file = {}});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
@@ -151,7 +145,7 @@ TEST_F(Trim, ATrimmedRecordingCanBeTrimmedAndGoneOnWith) {
 
 TEST_F(Trim, ARecordingOfAnotherReleaseCanBeWatched) {
   const auto other = folder_.file("other.mcap");
-  copy_journal(whole(), other, kAsItIs, kSimVersion + 1);
+  copy_journal(recorded_simulation(), other, kAsItIs, kSimVersion + 1);
   const auto trimmed = trim(other, to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   EXPECT_FALSE(trimmed->has_state);
@@ -165,18 +159,21 @@ TEST_F(Trim, ARecordingOfAnotherReleaseCanBeWatched) {
 TEST_F(Trim, RefusesWhatItCannotCut) {
   expect_refusal(folder_.file("none.mcap"), {.from = 0, .to = 1, .reduction_file = {}},
                  "none.mcap");
-  expect_refusal(whole(), {.from = 100, .to = 100, .reduction_file = {}},
+  expect_refusal(recorded_simulation(), {.from = 100, .to = 100, .reduction_file = {}},
                  "--from has to lie before --to");
-  expect_refusal(whole(), {.from = kRecordedTicks, .to = 9000, .reduction_file = {}},
+  expect_refusal(recorded_simulation(), {.from = kRecordedTicks, .to = 9000, .reduction_file = {}},
                  "before its end, 2.400 s");
-  expect_refusal(whole(), {.from = 1, .to = 2, .reduction_file = {}}, "has no frame between");
-  expect_refusal(whole(), {.from = kFrom, .to = kTo, .reduction_file = "liver.reduction"},
+  expect_refusal(recorded_simulation(), {.from = 1, .to = 2, .reduction_file = {}},
+                 "has no frame between");
+  expect_refusal(recorded_simulation(),
+                 {.from = kFrom, .to = kTo, .reduction_file = "liver.reduction"},
                  "without a reduction");
   const auto gapped = folder_.file("gapped.mcap");
   record_simulation(gapped, 800);
   expect_refusal(gapped, {.from = kFrom, .to = kTo, .reduction_file = {}}, "it has a gap");
   trocar::testing::save_file(to_, {});
-  expect_refusal(whole(), {.from = kFrom, .to = kTo, .reduction_file = {}}, "exists already");
+  expect_refusal(recorded_simulation(), {.from = kFrom, .to = kTo, .reduction_file = {}},
+                 "exists already");
 }
 
 }  // namespace

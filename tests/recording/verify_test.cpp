@@ -29,17 +29,6 @@ class Verify : public trocar::testing::ProgramFixture {
  protected:
   Verify() : ProgramFixture("trocar-journal") {}
 
-  // Simulated once for all tests.
-  static const std::string& sound() {
-    static const TemporaryFolder folder;
-    static const std::string path = [] {
-      auto file = folder.file("sound.mcap");
-      record_simulation(file);
-      return file;
-    }();
-    return path;
-  }
-
   VerifyReport verify(const std::string& path) {
     auto report = verify_journal(path);
     EXPECT_TRUE(report.ok()) << report.error().message;
@@ -48,7 +37,7 @@ class Verify : public trocar::testing::ProgramFixture {
   VerifyReport verify_copy(const Edit& edit, std::uint32_t sim_version = kSimVersion) {
     const auto copy = at("copy.mcap");
     std::filesystem::remove(copy);
-    copy_journal(sound(), copy, edit, sim_version);
+    copy_journal(recorded_simulation(), copy, edit, sim_version);
     return verify(copy);
   }
   // Changes the message of this kind in the frame of `kFrameTick`.
@@ -91,7 +80,7 @@ class Verify : public trocar::testing::ProgramFixture {
 };
 
 TEST_F(Verify, ASoundRecordingIsVerifiedWhole) {
-  const auto report = verify(sound());
+  const auto report = verify(recorded_simulation());
   std::string all;
   for (const auto& reason : report.reasons) all += reason + "\n";
   EXPECT_EQ(report.verdict(), Verdict::Verified)
@@ -110,9 +99,9 @@ TEST_F(Verify, ASoundRecordingIsVerifiedWhole) {
   EXPECT_EQ(report.snapshots_continued, report.snapshots_verified);
   EXPECT_GT(report.participants_verified, 0u);
   EXPECT_EQ(report.damaged_chunks, 0u);
-  EXPECT_EQ(exit_code(sound()), 0);
+  EXPECT_EQ(exit_code(recorded_simulation()), 0);
   EXPECT_NE(log().find("verified to tick 2400"), std::string::npos) << log();
-  EXPECT_EQ(exit_code(sound(), true), 0);
+  EXPECT_EQ(exit_code(recorded_simulation(), true), 0);
   EXPECT_NE(log().find("\"verified\": true"), std::string::npos) << log();
 }
 
@@ -287,11 +276,11 @@ TEST_F(Verify, EveryKindOfRemovedMessageIsMissed) {
 }
 
 TEST_F(Verify, ADamagedChunkIsNamed) {
-  auto journal = journal::SessionJournal::open(sound());
+  auto journal = journal::SessionJournal::open(recorded_simulation());
   ASSERT_TRUE(journal.ok());
   const auto& chunks = (*journal)->container().chunks();
   ASSERT_GT(chunks.size(), 6u);
-  auto bytes = load_file(sound());
+  auto bytes = load_file(recorded_simulation());
   const auto& chunk = chunks[chunks.size() / 2];
   bytes[chunk.chunk_offset + chunk.chunk_length / 2] ^= 0x40;
   const auto path = save("damaged.mcap", bytes);
@@ -303,11 +292,11 @@ TEST_F(Verify, ADamagedChunkIsNamed) {
 }
 
 TEST_F(Verify, DamageInWhatTheTicksDoNotNeedIsNamed) {
-  auto journal = journal::SessionJournal::open(sound());
+  auto journal = journal::SessionJournal::open(recorded_simulation());
   ASSERT_TRUE(journal.ok());
   const auto& chunk = (*journal)->container().chunks().front();
   ASSERT_GE(chunk.message_index_length, 16u);
-  auto bytes = load_file(sound());
+  auto bytes = load_file(recorded_simulation());
   bytes[chunk.chunk_offset + chunk.chunk_length + chunk.message_index_length - 4] ^= 0x5a;
   const auto path = save("damaged_index.mcap", bytes);
   const auto report = verify(path);
@@ -328,7 +317,7 @@ TEST_F(Verify, AGapIsNamed) {
 }
 
 TEST_F(Verify, AMissingEndIsNamed) {
-  auto bytes = load_file(sound());
+  auto bytes = load_file(recorded_simulation());
   bytes.resize(bytes.size() * 2 / 3);
   const auto path = save("cut.mcap", bytes);
   const auto report = verify(path);

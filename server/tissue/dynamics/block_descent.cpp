@@ -43,8 +43,8 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::size_t kUsualSweeps = 64;
 // If a node's step was not finite, the nodes within so many layers of it are restored with it.
 constexpr int kRestoredLayers = 3;
-// Folded domains have so many times the inertia that would do for them.
-constexpr float kCreep = 2;
+// The drag of folded domains is so many times the inertia that would do for them.
+constexpr float kDrag = 2;
 
 float sum(const Lanes& a) {
   return ((a.v[0] + a.v[4]) + (a.v[2] + a.v[6])) + ((a.v[1] + a.v[5]) + (a.v[3] + a.v[7]));
@@ -210,8 +210,8 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
     if (is_slow(group)) least *= 3 - 2 / static_cast<float>(far_interval_);
     const Float8 added =
         where(moves, _mm256_max_ps(fma8(nodal.stiffness, all(least), all(0) - inertia), all(0)));
-    // A node that creeps resists its motion, not the change of it.
-    inertia = inertia + added + where(moves, nodal.creep * all(kCreep * least));
+    // Drag resists a node's motion, not the change of it.
+    inertia = inertia + added + where(moves, nodal.drag * all(kDrag * least));
     momentum = fma8(ahead - start, added, momentum) - nodal.gradient;
   }
   store(inertia_[group].inertia, inertia);

@@ -114,7 +114,7 @@ void NodalHyperelastic<Law>::add_stress(Group group, const NodalStrain::Gradient
   // The volume's second derivative is no larger than the gradient.
   const Float8 squared = dot8(f0, f0) + (dot8(f1, f1) + dot8(f2, f2));
   const Float8 geometric = abs8(pressure) * _mm256_sqrt_ps(squared) * f.inverse_volume;
-  stress.creep = fma8(folded, bound + geometric, stress.creep);
+  stress.drag = fma8(folded, bound + geometric, stress.drag);
 }
 
 template <typename Law>

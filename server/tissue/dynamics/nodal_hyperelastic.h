@@ -18,8 +18,9 @@ struct NodalStress8 {
   std::array<Vec8, NodalStrain::kRows> rows;  // of dW/dF, W the energy per volume, Pa
   // Times |b|^2, a node's b there, it is at least the stiffness against the node's moves, Pa/m^3.
   Float8 stiffness;
-  // Times |b|^2, Pa/m^3: by how much a node creeps that is in a folded domain, and else 0.
-  Float8 creep;
+  // Is that of folded domains, with what their shape adds, and 0 of all others: overdamped, they
+  // cannot swing.
+  Float8 drag;
 };
 
 // This is the counterpart of Energy for smoothing domains, evaluated at the gradients that

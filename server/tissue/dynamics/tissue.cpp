@@ -89,7 +89,7 @@ void Tissue::update_nodal_stress(Group group, const Float4* x) {
   }
   for (std::size_t r = 0; r < kRows; ++r)
     store_strided(&nodal_stresses_[first + r], kRows, stress.rows[r],
-                  r == 0 ? stress.stiffness : stress.creep);
+                  r == 0 ? stress.stiffness : stress.drag);
 }
 
 Tissue::NodalForces Tissue::nodal_forces(Group group) const {
@@ -97,13 +97,13 @@ Tissue::NodalForces Tissue::nodal_forces(Group group) const {
   const Float4* const stresses = nodal_stresses_.data();
   for (const auto& row : nodal_strain_->rows(group)) {
     const Vec8 b = load(row.part);
-    Float8 stiffness, creep;
+    Float8 stiffness, drag;
     const Vec8 p0 = gather(stresses, row.domain, stiffness),
-               p1 = gather(stresses + 1, row.domain, creep), p2 = gather(stresses + 2, row.domain);
+               p1 = gather(stresses + 1, row.domain, drag), p2 = gather(stresses + 2, row.domain);
     forces.gradient = forces.gradient + Vec8{dot8(p0, b), dot8(p1, b), dot8(p2, b)};
     const Float8 squared = dot8(b, b);
     forces.stiffness = fma8(stiffness, squared, forces.stiffness);
-    forces.creep = fma8(creep, squared, forces.creep);
+    forces.drag = fma8(drag, squared, forces.drag);
   }
   return forces;
 }

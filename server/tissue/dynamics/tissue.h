@@ -66,7 +66,7 @@ class Tissue {
   struct NodalForces {
     Vec8 gradient;     // N
     Float8 stiffness;  // N/m, at least the largest eigenvalue of a node's block
-    Float8 creep;      // N/m, the part of it that is of folded domains, and what their shape adds
+    Float8 drag;       // N/m, likewise of folded domains, with what their shape adds
   };
   NodalForces nodal_forces(Group group) const;
 
@@ -107,7 +107,7 @@ class Tissue {
   std::vector<std::unique_ptr<Energy>> energies_;
   std::vector<std::unique_ptr<NodalStrainEnergy>> averaged_;
   const StrainScheme scheme_;
-  // Three per slot: rows of the stress, Pa; beside them stiffness and creep. Empty: Implicit.
+  // Three per slot: rows of the stress, Pa; beside them stiffness and drag. Empty: Implicit.
   std::vector<Float4> nodal_stresses_;
   std::unique_ptr<Relaxation> relaxation_;
   std::unique_ptr<RelaxedStress> relaxed_stress_;
