@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "tests/cutting/cut_organ.h"
+#include "tests/support/random.h"
 
 namespace trocar::cutting::testing {
 namespace {
@@ -92,6 +93,23 @@ TEST(ABladeHeldStill, CutsWhatIsDrawnPastIt) {
   }
   EXPECT_NEAR(stands.total().opened_area_m2, moves.total().opened_area_m2,
               0.01 * moves.total().opened_area_m2);
+}
+
+// A point that goes in along its own edge sweeps nothing, however the tissue trembles.
+TEST(ABladeHeldStill, CutsNothingWhereItSlidesAlongItsEdge) {
+  CutOrgan organ(box());
+  trocar::testing::Random random(7);
+  for (int i = 0; i <= 600; ++i) {
+    const Vec3d tip{0.003, 0.03 - 1e-4 * i, 0.004};
+    const auto tremble = [&] { return Vec3d{1, 0, 0.5} * random.between(-2e-7, 2e-7); };
+    if (i > 0) organ.cutter().carry(0, {tremble(), tremble()});
+    organ.cutter().move(0, Edge{tip, tip + Vec3d{0, 0.04, 0}});
+    organ.tick();
+  }
+  organ.cutter().lift(0);
+  organ.run_until_idle();
+  EXPECT_EQ(organ.total().splits, 0u);
+  EXPECT_EQ(organ.total().opened_area_m2, 0);
 }
 
 TEST(ABladeHeldStill, CutsNothingThatItMovesWith) {

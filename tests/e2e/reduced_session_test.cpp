@@ -64,9 +64,9 @@ fs::path write_press_script(const fs::path& folder) {
   key(2.5, -3, 0, "push");
   key(3, 10, 0, "none");
   key(3.2, 10, 0, "cut");
-  key(3.8, -4, 0, "cut");
-  key(4.5, -4, 8, "cut");
-  key(60, -4, 8, "none");
+  key(3.8, -9, 0, "cut");
+  key(4.5, -9, 20, "cut");
+  key(60, -9, 20, "none");
   return file;
 }
 

@@ -6,8 +6,8 @@
 // the blade is stopped: a hand that goes on feels a spring from there, which lets it back. Of
 // scissors a hand feels nothing: what they cut, their closing works for.
 //
-// The force follows by at most kMostStep_n in a tick where one of these ends and another begins, and
-// after a blade is lifted.
+// The force follows by at most kMostStep_n in a tick where one of these ends and another begins,
+// and after a blade is lifted.
 
 #include <array>
 

@@ -6,8 +6,8 @@
 // less what is up to 1.25 mm beside it: a blade has a thickness, and what it feels has no steps. A
 // wound that gapes wider, and what the blade has gone through, does nothing.
 //
-// The edge cuts by its motion in the tissue. So the tissue's own motion along it is measured, too: a
-// line fitted to its velocity at these places.
+// The edge cuts by its motion in the tissue. So the tissue's own motion along it is measured, too:
+// a line fitted to its velocity at these places.
 //
 // The edge is looked at in kEdgeParts * kEdgeSamples places. Cost: of collecting the nodes by the
 // edge (NodeBundles), and a clipped line per tet at these.
