@@ -38,6 +38,15 @@ std::string sync_text(const replica::Replica& replica) {
   return {};
 }
 
+// The state of the newest frame may still be under way; then the one before has it.
+wire::FrameFigures figures_of(const replica::Replica& replica) {
+  const auto* newest = replica.newest();
+  if (newest == nullptr) return {};
+  const auto& history = replica.history();
+  const bool is_complete = newest->has_state || history.size() < 2;
+  return (is_complete ? *newest : history[history.size() - 2]).figures;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Picture>> Picture::make(const ClientOptions& options,
@@ -91,6 +100,7 @@ ui::HudTray tray_of(const Hands::Choice& choice) {
 std::vector<ui::HudParticipant> Picture::participants_of(const replica::Replica& replica,
                                                          const Pane& pane, bool is_replay) {
   std::vector<ui::HudParticipant> participants;
+  const auto waiting = figures_of(replica).pace.rate.waiting_blades;
   for (const auto& participant : replica.participants()) {
     ui::HudParticipant shown;
     shown.name = participant.name;
@@ -106,6 +116,7 @@ std::vector<ui::HudParticipant> Picture::participants_of(const replica::Replica&
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
       shown.is_inside = shown.is_inside || tool.is_inside;
+      shown.waits = shown.waits || (waiting >> tool.slot.value & 1) != 0;
       if (tool.verb != tool::Verb::None) {
         shown.verb = tool.verb;
         shown.form = shape_of(replica, tool.slot).form;
@@ -238,10 +249,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.is_away = source.state() == replica::SourceState::Away ||
                   source.state() == replica::SourceState::Closed;
   if (const auto* newest = replica.newest()) {
-    // The state of the newest frame may still be under way; then the one before has it.
-    const auto& history = replica.history();
-    const bool is_complete = newest->has_state || history.size() < 2;
-    model.figures = (is_complete ? *newest : history[history.size() - 2]).figures;
+    model.figures = figures_of(replica);
     model.session_seconds = static_cast<double>(newest->tick) * 1e-3;
   }
   const auto statistics = source.statistics();

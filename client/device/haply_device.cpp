@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -23,6 +22,7 @@
 #include "client/device/device_exchange.h"
 #include "client/device/haply_messages.h"
 #include "common/base/no_throw.h"
+#include "common/base/spawn.h"
 
 namespace trocar::device {
 namespace {
@@ -57,7 +57,7 @@ class HaplyDevice::Conversation {
 
   Status begin() {
     auto opened = opened_.get_future();
-    asio::co_spawn(context_, run(), rethrow);
+    spawn(context_.get_executor(), run(), rethrow);
     thread_ = std::thread([this] { run_context(); });
     return opened.get();
   }
@@ -124,7 +124,7 @@ class HaplyDevice::Conversation {
     last_words_.emplace(socket().native_handle(),
                         websocket_frame(haply_command(device_id_, Vec3d{}, false)));
     opened_.set_value(Status{});
-    asio::co_spawn(context_, read_states(), rethrow);
+    spawn(context_.get_executor(), read_states(), rethrow);
     co_await send_forces();
   }
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 
 #include "common/base/no_throw.h"
+#include "common/base/spawn.h"
 #include "common/wire/framing.h"
 
 namespace trocar::net {
@@ -54,7 +54,8 @@ DatagramPath::DatagramPath(asio::io_context& context, udp::endpoint server, secu
       timer_(context),
       pause_(kFirstPause) {
   begin_try();
-  asio::co_spawn(context_, tend(is_alive_), [](std::exception_ptr failure) { rethrow(failure); });
+  spawn(context_.get_executor(), tend(is_alive_),
+        [](std::exception_ptr failure) { rethrow(failure); });
 }
 
 DatagramPath::~DatagramPath() {
@@ -80,8 +81,8 @@ void DatagramPath::begin_try() {
   });
   try_ = std::move(next);
   try_->channel->start();
-  asio::co_spawn(context_, receive(try_, is_alive_),
-                 [](std::exception_ptr failure) { rethrow(failure); });
+  spawn(context_.get_executor(), receive(try_, is_alive_),
+        [](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void DatagramPath::end_try() {

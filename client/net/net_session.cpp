@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
 #include <cmath>
 
 #include "client/replica/printable_message.h"
 #include "common/base/log.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/secure/certificate.h"
@@ -31,7 +31,7 @@ NetSource::Session::Session(NetSourceOptions options)
       places_{{options_.host, options_.port}},
       inbound_(options_.inbound_capacity),
       outbound_(options_.outbound_capacity) {
-  asio::co_spawn(context_, run(), [this](std::exception_ptr failure) {
+  spawn(context_.get_executor(), run(), [this](std::exception_ptr failure) {
     end_if_failed(failure);
     has_ended_.store(true, std::memory_order_release);
   });
@@ -106,8 +106,8 @@ void NetSource::Session::begin_close(const std::string& reason) {
   control_.push_back(wire::encode_envelope(envelope));
   wake_timer_.cancel();
   room_timer_.cancel();
-  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline),
-                 [this](std::exception_ptr failure) { end_if_failed(failure); });
+  spawn(context_.get_executor(), expire(Clock::now() + kCloseDeadline),
+        [this](std::exception_ptr failure) { end_if_failed(failure); });
 }
 
 asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
@@ -190,9 +190,9 @@ void NetSource::Session::begin_conversation() {
     --talkers_;
     end_if_failed(failure);
   };
-  asio::co_spawn(context_, write_messages(), ended);
-  asio::co_spawn(context_, ping(), ended);
-  if (options_.hands != nullptr) asio::co_spawn(context_, serve_hands(), ended);
+  spawn(context_.get_executor(), write_messages(), ended);
+  spawn(context_.get_executor(), ping(), ended);
+  if (options_.hands != nullptr) spawn(context_.get_executor(), serve_hands(), ended);
 }
 
 // A text that says why stands already if this program has broken it.
@@ -235,8 +235,8 @@ asio::awaitable<bool> NetSource::Session::come_back() {
     co_await retry_timer_.async_wait(kNoThrow);
     if (is_done_) break;
     const auto deadline = Clock::now() + options_.return_try;
-    asio::co_spawn(context_, expire(deadline),
-                   [this](std::exception_ptr failure) { end_if_failed(failure); });
+    spawn(context_.get_executor(), expire(deadline),
+          [this](std::exception_ptr failure) { end_if_failed(failure); });
     const bool is_ready = co_await try_to_connect(deadline);
     if (is_ready) co_return true;
     place_ = (place_ + 1) % places_.size();
@@ -305,8 +305,8 @@ asio::awaitable<bool> NetSource::Session::connect() {
   const bool is_first = connect_until_ == Clock::time_point{};
   if (is_first) connect_until_ = Clock::now() + options_.connect_deadline;
   const auto deadline = connect_until_;
-  asio::co_spawn(context_, expire(deadline),
-                 [this](std::exception_ptr failure) { end_if_failed(failure); });
+  spawn(context_.get_executor(), expire(deadline),
+        [this](std::exception_ptr failure) { end_if_failed(failure); });
   if (is_first) why_not_ = "no answer";
   bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {

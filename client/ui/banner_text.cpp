@@ -13,6 +13,24 @@ std::string tenths(double value) {
   return std::to_string(whole / 10) + "." + std::to_string(whole % 10);
 }
 
+// Says whose blades are kept waiting; empty: nobody's.
+std::string waiting_text(const HudModel& model) {
+  std::string names;
+  for (const auto& who : model.participants) {
+    if (!who.waits) continue;
+    if (who.is_self) return "Your blade waits: you cut faster than the server can follow.";
+    names += (names.empty() ? "" : ", ") + who.name;
+  }
+  return names.empty() ? "" : "Kept waiting, for cutting faster than the server can: " + names;
+}
+
+std::string waiting_advice(const HudModel& model) {
+  if (model.conduct) return "Freeze holds the tools of who goes on so.";
+  const bool is_own = std::ranges::any_of(model.participants,
+                                          [](const auto& who) { return who.is_self && who.waits; });
+  return is_own ? "Draw back a little, and cut more slowly." : "You can go on as you do.";
+}
+
 }  // namespace
 
 std::vector<Banner> banners_of(const HudModel& model) {
@@ -36,6 +54,8 @@ std::vector<Banner> banners_of(const HudModel& model) {
                           [](const auto& who) { return who.is_self && who.is_inside; }))
     banners.push_back({"Your instrument is inside the tissue, and touches nothing.",
                        "Draw it out with the wheel, or move it off the organ.", RateTone::Notice});
+  if (const auto waiting = waiting_text(model); !waiting.empty() && !model.timeline)
+    banners.push_back({waiting, waiting_advice(model), RateTone::Notice});
   if (!model.is_paused && model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
     banners.push_back({"This picture is " + tenths(*model.surface_age_ms * 1e-3) + " s old.",
                        "The connection is slow or has stopped: wait before you cut.",

@@ -35,15 +35,17 @@ void draw_doing(const HudParticipant& p) {
                       : p.verb == tool::Verb::None       ? replica::name_of(p.role)
                       : !p.has_claim                     ? "refused"
                       : p.is_inside                      ? "inside tissue"
+                      : p.waits                          ? "waits"
                       : p.verb == tool::Verb::Grasp      ? "grasps"
                       : p.verb == tool::Verb::Cut        ? "cuts"
                       : p.form == tool::Form::Suction    ? "sucks"
                       : p.form == tool::Form::Coagulator ? "seals"
                                                          : "pushes";
   if (p.has_tool && p.verb != tool::Verb::None && !p.is_silent && !p.is_away && !p.is_frozen)
-    ImGui::TextColored(
-        p.has_claim && !p.is_inside ? ImGui::GetStyle().Colors[ImGuiCol_Text] : kTrouble, "%s",
-        doing);
+    ImGui::TextColored(p.has_claim && !p.is_inside && !p.waits
+                           ? ImGui::GetStyle().Colors[ImGuiCol_Text]
+                           : kTrouble,
+                       "%s", doing);
   else
     ImGui::TextDisabled("%s", doing);
 }

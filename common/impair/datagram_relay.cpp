@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/co_spawn.hpp>
+
+#include "common/base/spawn.h"
 
 namespace trocar::impair {
 namespace {
@@ -42,8 +43,8 @@ DatagramRelay::DatagramRelay(std::shared_ptr<Network> network, udp::socket clien
       retry_(clients_.get_executor()) {}
 
 void DatagramRelay::run(asio::awaitable<void> work) {
-  asio::co_spawn(clients_.get_executor(), std::move(work),
-                 [self = shared_from_this()](std::exception_ptr failure) { rethrow(failure); });
+  spawn(clients_.get_executor(), std::move(work),
+        [self = shared_from_this()](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void DatagramRelay::start() {

@@ -1,11 +1,11 @@
 #include "common/impair/proxy.h"
 
 #include <algorithm>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <map>
 
 #include "common/base/json.h"
+#include "common/base/spawn.h"
 #include "common/impair/datagram_relay.h"
 #include "common/impair/stream_relay.h"
 
@@ -47,8 +47,8 @@ class Proxy::Core : public std::enable_shared_from_this<Proxy::Core> {
 
   void start() {
     datagrams->start();
-    asio::co_spawn(acceptor.get_executor(), accept_streams(),
-                   [self = shared_from_this()](std::exception_ptr failure) { rethrow(failure); });
+    spawn(acceptor.get_executor(), accept_streams(),
+          [self = shared_from_this()](std::exception_ptr failure) { rethrow(failure); });
   }
 
   void stop() {

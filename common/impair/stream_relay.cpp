@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/write.hpp>
+
+#include "common/base/spawn.h"
 
 namespace trocar::impair {
 namespace {
@@ -45,8 +46,8 @@ StreamRelay::StreamRelay(std::shared_ptr<Network> network, tcp::socket client, s
       down_(network_->down, *network_, Flow::StreamDown, number, server_, client_) {}
 
 void StreamRelay::run(asio::awaitable<void> work) {
-  asio::co_spawn(client_.get_executor(), std::move(work),
-                 [self = shared_from_this()](std::exception_ptr failure) { rethrow(failure); });
+  spawn(client_.get_executor(), std::move(work),
+        [self = shared_from_this()](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void StreamRelay::start(std::function<void()> closed) {

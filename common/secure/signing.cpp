@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Key = std::shared_ptr<EVP_PKEY>;
+using SharedKey = std::shared_ptr<EVP_PKEY>;
 
 // A key with a password is not read: nobody is there to be asked for it.
 int no_password(char*, int, int, void*) {
@@ -24,13 +24,13 @@ int no_password(char*, int, int, void*) {
 
 using ReadPem = EVP_PKEY* (*)(BIO*, EVP_PKEY**, pem_password_cb*, void*);
 
-Result<Key> read_key(const std::string& file, ReadPem read, const std::string& is_none) {
+Result<SharedKey> read_key(const std::string& file, ReadPem read, const std::string& is_none) {
   const auto text = read_small_file(file);
   if (!text) return text.error();
   const std::unique_ptr<BIO, decltype(&BIO_free_all)> bio(
       BIO_new_mem_buf(text->data(), static_cast<int>(text->size())), BIO_free_all);
   TROCAR_ASSERT(bio != nullptr);
-  Key key(read(bio.get(), nullptr, no_password, nullptr), EVP_PKEY_free);
+  SharedKey key(read(bio.get(), nullptr, no_password, nullptr), EVP_PKEY_free);
   static_cast<void>(last_openssl_error());  // what is wrong with it is said below
   if (key && EVP_PKEY_get_id(key.get()) == EVP_PKEY_ED25519) return key;
   return Error{ErrorCode::BadFile, file + ": " + is_none};
@@ -86,8 +86,9 @@ Result<PublicKey> read_public_key(const std::string& file) {
 }
 
 bool is_signed_by(const PublicKey& key, BytesView bytes, const Signature& signature) {
-  const Key known(EVP_PKEY_new_raw_public_key(EVP_PKEY_ED25519, nullptr, key.data(), key.size()),
-                  EVP_PKEY_free);
+  const SharedKey known(
+      EVP_PKEY_new_raw_public_key(EVP_PKEY_ED25519, nullptr, key.data(), key.size()),
+      EVP_PKEY_free);
   const Context context(EVP_MD_CTX_new());
   const bool is_signed =
       known && context &&

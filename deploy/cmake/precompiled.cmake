@@ -23,24 +23,37 @@ file(CONFIGURE OUTPUT "${TROCAR_PRECOMPILED_SOURCE}" CONTENT "// Carries the fla
 # thirds of the time.
 set(TROCAR_TEST_OPTIONS $<$<CONFIG:Release>:-O1> $<$<CONFIG:Release>:-g0>)
 
-# Of the product's libraries and programs. It holds no path of this checkout.
+# What no tick waits for: a fifth of its time to compile is saved. TROCAR_COLD_FOLDERS says which folders.
+set(TROCAR_COLD_OPTIONS $<$<CONFIG:Release>:-O1>)
+
+# Of the product's libraries and programs, one for each level of optimisation: gcc compiles what follows a
+# precompiled header with that header's level, whatever it is told. They hold no path of this checkout.
 if(TROCAR_PRECOMPILES AND TROCAR_UNITY)
-  add_library(trocar_product_headers OBJECT "${TROCAR_PRECOMPILED_SOURCE}")
-  target_link_libraries(trocar_product_headers PRIVATE trocar_options)
-  target_precompile_headers(trocar_product_headers PRIVATE ${TROCAR_STANDARD_HEADERS})
-  target_compile_options(trocar_product_headers PRIVATE -fpch-preprocess)
-  make_position_independent(trocar_product_headers)
+  foreach(name IN ITEMS product cold)
+    add_library(trocar_${name}_headers OBJECT "${TROCAR_PRECOMPILED_SOURCE}")
+    target_link_libraries(trocar_${name}_headers PRIVATE trocar_options)
+    target_precompile_headers(trocar_${name}_headers PRIVATE ${TROCAR_STANDARD_HEADERS})
+    target_compile_options(trocar_${name}_headers PRIVATE -fpch-preprocess)
+    make_position_independent(trocar_${name}_headers)
+  endforeach()
+  target_compile_options(trocar_cold_headers PRIVATE ${TROCAR_COLD_OPTIONS})
 endif()
 
 # For libraries that make_position_independent() made, and for programs, which are then compiled as these are.
 function(use_product_headers target)
-  if(TARGET trocar_product_headers)
+  set(headers trocar_product_headers)
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${PROJECT_SOURCE_DIR}" OUTPUT_VARIABLE folder)
+  if(folder IN_LIST TROCAR_COLD_FOLDERS)
+    set(headers trocar_cold_headers)
+    target_compile_options(${target} PRIVATE ${TROCAR_COLD_OPTIONS})
+  endif()
+  if(TARGET ${headers})
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "EXECUTABLE")
       target_compile_options(${target} PRIVATE -fPIC ${TROCAR_POSITION_INDEPENDENT_OPTIONS})
     endif()
     target_compile_options(${target} PRIVATE ${TROCAR_PRECOMPILED_OPTIONS})
-    target_precompile_headers(${target} REUSE_FROM trocar_product_headers)
+    target_precompile_headers(${target} REUSE_FROM ${headers})
   endif()
 endfunction()
 

@@ -1,11 +1,11 @@
 #include "server/relay/uplink.h"
 
 #include <algorithm>
-#include <boost/asio/co_spawn.hpp>
 
 #include "common/base/log.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "proto/wire.pb.h"
@@ -41,7 +41,7 @@ Uplink::~Uplink() = default;
 void Uplink::start(UpstreamEvents events) {
   events_ = std::move(events);
   deadline_ns_ = monotonic_ns() + ns_of(options_.reach_deadline);
-  asio::co_spawn(executor_, run(), [](std::exception_ptr failure) { rethrow(failure); });
+  spawn(executor_, run(), [](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void Uplink::stop() {
@@ -134,7 +134,7 @@ asio::awaitable<void> Uplink::talk() {
 
 void Uplink::spawn_talker(asio::awaitable<void> work) {
   ++talkers_;
-  asio::co_spawn(executor_, std::move(work), [this](std::exception_ptr failure) {
+  spawn(executor_, std::move(work), [this](std::exception_ptr failure) {
     --talkers_;
     talkers_ended_.cancel();
     rethrow(failure);

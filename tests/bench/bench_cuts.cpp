@@ -12,8 +12,11 @@
 
 #include "common/base/program.h"
 #include "common/math/box.h"
+#include "server/app/server/pacer.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/session/control/blade_waits.h"
+#include "server/session/control/rate_controller.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/support/random.h"
 
@@ -22,13 +25,14 @@ namespace {
 
 constexpr const char* kProgram = "bench_cuts";
 constexpr int kBuiltInTets = 88'000;
+constexpr step::TickDecisions kFixed{.far_interval = 3};
 constexpr float kBeside_m = 0.009f, kBeyond_m = 0.01f;
 
 struct Options {
   std::string organ, law;
   double seconds = 10, speed = 0.1, edge_mm = 120, thrown_mm = 0, leave_s = 1e9;
   int blades = 1;
-  bool has_tips = false, prints_seconds = false;
+  bool has_tips = false, prints_seconds = false, is_controlled = false;
   unsigned workers = 1;
 };
 
@@ -152,6 +156,41 @@ struct Ticks {
   }
 };
 
+// A session's clock, on which a tick takes its CPU time and nothing else takes any, with the
+// controller that follows it.
+class SessionClock {
+ public:
+  explicit SessionClock(const step::Simulation& simulation)
+      : controller_({.highest = simulation.with_sweeps_for_organ({}),
+                     .layer_sweeps = simulation.context().solve.far_plan.with_sweeps(0).sweeps,
+                     .most_far_sweeps = control::kMostFarSweeps}) {}
+
+  step::TickDecisions decisions() const {
+    auto decisions = controller_.decisions();
+    decisions.waiting_blades = waits_.waiting();
+    return decisions;
+  }
+  std::uint64_t slow_ticks() const { return pacer_.slow_ticks(); }
+
+  void pass(const step::Simulation& simulation, const step::TickReport& report) {
+    now_ns_ = std::max(now_ns_, pacer_.due_ns());
+    const auto lateness_ns = now_ns_ - pacer_.due_ns();
+    pacer_.begin_tick(now_ns_);
+    std::uint64_t work_ns = 0;
+    for (const auto ns : report.stage_cpu_ns) work_ns += ns;
+    now_ns_ += work_ns;
+    controller_.observe(report, {work_ns, lateness_ns});
+    waits_.observe(control::read_cutting_speeds(simulation),
+                   static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds));
+  }
+
+ private:
+  app::Pacer pacer_{0};
+  std::uint64_t now_ns_ = 0;
+  control::RateController controller_;
+  control::BladeWaits waits_;
+};
+
 void print_distribution(const char* what, std::vector<double>& us) {
   std::ranges::sort(us);
   std::printf("  %s: median %.0f, p99 %.0f, worst %.0f us\n", what, part(us, 0.5), part(us, 0.99),
@@ -168,14 +207,22 @@ void run(organ::Organ organ, const Options& options) {
   hands.join(inputs);
   Ticks ticks;
   double second_us = 0;
+  SessionClock clock(simulation);
+  Tick slow_before = 0;
   for (Tick tick = 1; tick <= static_cast<Tick>(options.seconds * 1000); ++tick) {
     hands.move(tick, inputs);
-    ticks.add(simulation.tick(inputs, {.far_interval = 3}));
+    const auto& report =
+        simulation.tick(inputs, options.is_controlled ? clock.decisions() : kFixed);
+    ticks.add(report);
+    clock.pass(simulation, report);
     inputs.clear();
     if (!options.prints_seconds || tick % 1000 != 0) continue;
-    std::printf("  second %2.0f: %.2f s of CPU\n", static_cast<double>(tick) * 1e-3,
-                1e-6 * (ticks.sum_us - second_us));
+    const auto slow = static_cast<double>(clock.slow_ticks() - slow_before);
+    std::printf("  second %2.0f: %.2f s of CPU, time at %.2f of real time\n",
+                static_cast<double>(tick) * 1e-3, 1e-6 * (ticks.sum_us - second_us),
+                1000 / (1000 + slow));
     std::fflush(stdout);
+    slow_before = clock.slow_ticks();
     second_us = ticks.sum_us;
   }
   std::printf("%s, %d blade(s) at %.0f cm/s, %.0f s, hash %016" PRIx64 "\n", name.c_str(),
@@ -213,6 +260,8 @@ int main(int argc, char** argv) {
   app.add_flag("--tips", options.has_tips, "each hand has a tip that is thrown, too");
   app.add_option("--leave", options.leave_s, "blades lift and go after so many seconds");
   app.add_flag("--each-second", options.prints_seconds, "tells what each second took");
+  app.add_flag("--controlled", options.is_controlled,
+               "decide as a session does whose only load this is, from CPU time; no equal hashes");
   app.add_option("--workers", options.workers)->capture_default_str()->check(CLI::Range(1, 64));
   CLI11_PARSE(app, argc, argv);
   auto organ = options.organ.empty() ? catalogue::make_liver(kBuiltInTets)

@@ -1,7 +1,8 @@
 // This program measures ticks in which nobody touches the tissue, without a network: after a blade
-// was waved in the liver, after minutes of cutting, and while a free piece falls; and ticks in
-// which a finger presses far from old wounds. It prints medians of thread CPU time by stage beside
-// those of the uncut organ; the state hash says that it is the same work.
+// was waved in the liver or swung about in it by an ordinary hand, after minutes of cutting, and
+// while a free piece falls; and ticks in which a finger presses far from old wounds. It prints
+// medians of thread CPU time by stage beside those of the uncut organ; the state hash says that it
+// is the same work.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -12,7 +13,9 @@
 #include "common/base/program.h"
 #include "common/math/box.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/step/cut_rest.h"
 
 namespace trocar {
 namespace {
@@ -20,10 +23,13 @@ namespace {
 constexpr const char* kProgram = "bench_rest";
 
 struct Options {
-  std::vector<std::string> scenes{"wave", "wound", "minutes", "fall"};
+  std::vector<std::string> scenes{"swing", "cuts", "wave", "wound", "minutes", "fall"};
+  std::string organ = "elastic-liver";
+  float gravity_m_s2 = 0;
+  double swing_s = 15, swing_m_s = 0.4;
   bool is_measured = false;
   double wave_s = 15, minutes = 1, fall_s = 1;
-  int wounds = 5;
+  int wounds = 5, seeds = 1;
 };
 
 Box<float> box_of(const organ::Organ& organ) {
@@ -143,6 +149,23 @@ organ::Organ liver(const Options& options) {
   return std::move(*organ);
 }
 
+// Ten random cuts in organs that nobody tuned for.
+void cuts(const Options& options) {
+  std::printf("ten random cuts, then nobody touches\n");
+  for (int organ = 0; organ < step::testing::kLawOrgans; ++organ)
+    for (int load = 0; load < step::testing::kRestLoads; ++load)
+      for (int seed = 1; seed <= options.seeds; ++seed) {
+        const auto rest = step::testing::run_cut_rest(
+            organ, static_cast<step::testing::RestLoad>(load), static_cast<unsigned>(seed));
+        std::printf(
+            "  %-48s %6zu tets, asleep after %5d ms, fastest %7.2f mm/s, %.1e J, tick %5.0f us, "
+            "hash %016" PRIx64 "\n",
+            rest.name.c_str(), rest.tets, rest.asleep_after, 1e3 * rest.motion.fastest_m_s,
+            rest.motion.kinetic_j, rest.tick_us, rest.hash);
+        std::fflush(stdout);
+      }
+}
+
 // The tip goes to and fro along x at 25 cm/s while it wanders slowly along z.
 Vec3f wave(const Box<float>& box, double seconds, double wander_hz) {
   const auto turn = [](double phase) { return static_cast<float>(std::sin(2 * M_PI * phase)); };
@@ -166,6 +189,54 @@ void wave(const Options& options) {
   print("1 s after the blade", session.run(1));
   session.run(2);
   print("4 s after the blade", session.run(1));
+  session.end();
+}
+
+// The default instrument goes about in the organ as fast as a mouse, and then is gone.
+void swing(const Options& options) {
+  std::printf("%s: an ordinary blade swings at %.1f m/s for %.0f s, then nobody touches\n",
+              options.organ.c_str(), options.swing_m_s, options.swing_s);
+  auto loaded = catalogue::load_organ(options.organ);
+  if (!loaded) return void(std::printf("  %s\n", loaded.error().message.c_str()));
+  auto organ = std::move(*loaded);
+  if (options.gravity_m_s2 > 0) organ.gravity_m_s2 = {0, -options.gravity_m_s2, 0};
+  Session session(std::move(organ), tool::ToolShape{}.edge_m);
+  const auto& box = session.box();
+  const Vec3f middle = (box.least + box.most) * 0.5f, size = box.most - box.least;
+  const Vec3f reach{0.22f * size.x, 0.22f * size.y, 0.1f * size.z};
+  session.run(0.2);
+  print("uncut", session.run(0.5));
+  const double per_s = options.swing_m_s / (0.8 * static_cast<double>(reach.x));
+  Stretch last;
+  for (int i = 0; i < static_cast<int>(options.swing_s * 1000); ++i) {
+    const double phase = per_s * 1e-3 * i;
+    const auto turn = [&](double times) { return static_cast<float>(std::cos(times * phase)); };
+    if (i % 8 == 0)
+      session.put(
+          middle + Vec3f{reach.x * turn(1), reach.y * std::sin(1.37f * static_cast<float>(phase)),
+                         reach.z * std::sin(0.71f * static_cast<float>(phase))},
+          tool::Verb::Cut);
+    const auto& report = session.tick();
+    if (i + 1000 >= static_cast<int>(options.swing_s * 1000)) last.add(report);
+  }
+  print("the last second of it", last);
+  session.put({0, 0.5f, 0}, tool::Verb::None);
+  int asleep_after = -1;
+  Stretch rest;
+  for (int i = 1; i <= 3000; ++i) {
+    rest.add(session.tick());
+    const auto motion = step::testing::motion_of(session.simulation().state().world);
+    if (motion.is_asleep && asleep_after < 0) asleep_after = i;
+    if (i % 1000 != 0) continue;
+    print("a second of rest", rest);
+    std::printf("    kinetic energy %.1e J, fastest node %.2f mm/s\n", motion.kinetic_j,
+                1e3 * motion.fastest_m_s);
+    rest = {};
+  }
+  if (asleep_after < 0)
+    std::printf("  never asleep\n");
+  else
+    std::printf("  asleep after %d ms\n", asleep_after);
   session.end();
 }
 
@@ -276,9 +347,14 @@ int main(int argc, char** argv) {
   begin_program(kProgram);
   Options options;
   CLI::App app{"CPU time of ticks in which cut tissue is at rest", kProgram};
-  app.add_option("scenes", options.scenes, "wave, wound, minutes, fall")
+  app.add_option("scenes", options.scenes, "swing, cuts, wave, wound, minutes, fall")
       ->capture_default_str()
-      ->check(CLI::IsMember({"wave", "wound", "minutes", "fall"}));
+      ->check(CLI::IsMember({"swing", "cuts", "wave", "wound", "minutes", "fall"}));
+  app.add_option("--organ", options.organ, "organ that a blade swings in")->capture_default_str();
+  app.add_option("--gravity", options.gravity_m_s2, "on that organ, m/s^2")->capture_default_str();
+  app.add_option("--seeds", options.seeds, "of random cuts")->capture_default_str();
+  app.add_option("--swing", options.swing_s, "s of swinging")->capture_default_str();
+  app.add_option("--speed", options.swing_m_s, "of swinging, m/s")->capture_default_str();
   app.add_flag("--measured", options.is_measured, "the measured liver, not the elastic one");
   app.add_option("--wave", options.wave_s, "s of waving")->capture_default_str();
   app.add_option("--minutes", options.minutes, "of cutting")->capture_default_str();
@@ -286,6 +362,8 @@ int main(int argc, char** argv) {
   app.add_option("--fall", options.fall_s, "s of falling")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   for (const auto& scene : options.scenes) {
+    if (scene == "swing") swing(options);
+    if (scene == "cuts") cuts(options);
     if (scene == "wave") wave(options);
     if (scene == "wound") wound(options);
     if (scene == "minutes") minutes(options);

@@ -40,6 +40,27 @@ TEST(RandomCuts, OfAGallbladder) {
   cut_and_check(gallbladder, 60, 4);
 }
 
+// Edges along wounds are longer where the mesh has grown.
+TEST(RandomCuts, AMeshThatHasGrownGrowsSlowerAndIsCutAsMuch) {
+  const auto organ = box_organ(12, 12, 12, 0.01);
+  const auto cut = [&](const Settings& settings) {
+    auto box = std::make_unique<CutOrgan>(organ, settings);
+    RandomStrokes strokes(organ, box->cutter().mean_h(), 6);
+    for (int stroke = 0; stroke < 40; ++stroke) box->stroke(strokes.next(StrokeKind::Knife));
+    EXPECT_EQ(box->check(), "");
+    return box;
+  };
+  Settings even;
+  even.growing_length_floor_h = even.grown_length_floor_h = even.length_floor_h;
+  const auto staged = cut({}), fine = cut(even);
+  const auto uncut = static_cast<double>(organ.mesh.tets.size());
+  const auto growth = [&](const CutOrgan& box) {
+    return static_cast<double>(box.topology().tet_count()) / uncut - 1;
+  };
+  EXPECT_LT(growth(*staged), 0.7 * growth(*fine));
+  EXPECT_GT(staged->total().opened_area_m2, 0.9 * fine->total().opened_area_m2);
+}
+
 TEST(RandomCuts, ThroughCutsLeaveNoBridge) {
   const auto organ = box_organ(8, 8, 8, 0.01);
   const InsideTest inside(organ.mesh);

@@ -29,32 +29,53 @@ is_generated() { head -n 5 "$1" | grep -qiE 'generated|(written|made) by'; }
 prose() { awk '/^```/ {f = !f; print ""; next} f || /^(    |\t)[^-* ]/ {print ""; next} {print}' "$1"; }
 
 # Anchors of a page, as GitHub and MkDocs make them from its headings.
+declare -A anchors_of=()
 anchors() {
+  [ -n "${anchors_of[$1]:-}" ] || anchors_of[$1]=$'\n'$(made_anchors "$1")$'\n'
+}
+made_anchors() {
   prose "$1" | sed -n 's/^#\{1,6\} \(.*\)$/\1/p' | tr '[:upper:]' '[:lower:]' |
     sed 's/[^a-z0-9 _-]//g; s/^ *//; s/ *$//; s/ /-/g'
 }
 
-# Whether sources say it so, or declare it in the namespace of that name.
-is_name_of_source() { # SCOPE::NAME
-  local scope=${1%::*} name=${1##*::}
-  scope=${scope##*::}
-  grep -rqwF --include='*.h' --include='*.cpp' -- "$scope::$name" common server client && return
-  grep -rlE --include='*.h' "^namespace trocar::$scope " common server client |
-    xargs -r grep -qwE "(class|struct) $name"
+# All names of the form SCOPE::NAME, once: those that sources say so, and the classes that a header declares
+# beside the namespace SCOPE.
+said_names() {
+  {
+    grep -rhoE --include='*.h' --include='*.cpp' '[A-Za-z0-9_]+(::[A-Za-z0-9_]+)+' common server client |
+      awk -F:: '{for (i = 1; i < NF; ++i) print $i "::" $(i + 1)}'
+    find common server client -name '*.h' -print0 | xargs -0 awk '
+      function done(s, n) { for (s in scopes) for (n in names) print s "::" n; delete scopes; delete names }
+      FNR == 1 { done() }
+      /^namespace trocar::[a-z_0-9]+ / { scope = $2; sub(/^trocar::/, "", scope); scopes[scope] }
+      { line = $0
+        while (match(line, /(class|struct) [A-Za-z0-9_]+/)) {
+          word = substr(line, RSTART, RLENGTH); sub(/^[a-z]+ /, "", word); names[word]
+          line = substr(line, RSTART + RLENGTH)
+        } }
+      END { done() }'
+  } | sort -u >"$work/names"
 }
 
 check_links() {
   local page target file anchor
+  said_names
   for page in "${pages[@]}"; do
     while read -r target; do
       case $target in http://* | https://* | mailto:*) continue ;; esac
       file=${target%%#*} anchor=
       [[ $target == *'#'* ]] && anchor=${target#*#}
-      if [ -z "$file" ]; then file=$page; else file=$(dirname "$page")/$file; fi
+      if [ -z "$file" ]; then
+        file=$page
+      elif [[ $page == */* ]]; then
+        file=${page%/*}/$file
+      fi
       if [ ! -e "$file" ]; then
         fault "$page: link to $target: there is no such file"
-      elif [ -n "$anchor" ] && ! anchors "$file" | grep -qxF -- "$anchor"; then
-        fault "$page: link to $target: $file has no such heading"
+      elif [ -n "$anchor" ]; then
+        anchors "$file"
+        [[ ${anchors_of[$file]} == *$'\n'"$anchor"$'\n'* ]] ||
+          fault "$page: link to $target: $file has no such heading"
       fi
     done < <(prose "$page" | grep -oE '\]\([^) ]+\)' | sed 's/^](//; s/)$//')
     # Paths of the source in code spans.
@@ -63,9 +84,9 @@ check_links() {
     done < <(grep -oE '`(server|client|common|proto|tests|deploy)/[A-Za-z0-9_./-]*[A-Za-z0-9_]`' "$page" |
       tr -d '`' | sort -u)
     # Names of the source in code spans, as scope::name.
-    while read -r target; do
-      is_name_of_source "$target" || fault "$page: names $target, which no source has"
-    done < <(grep -oE '`[A-Za-z_]+(::[A-Za-z_]+)+`' "$page" | tr -d '`' | sort -u)
+    grep -oE '`[A-Za-z_]+(::[A-Za-z_]+)+`' "$page" | tr -d '`' | sort -u |
+      awk -v page="$page" -F:: 'NR == FNR {is_said[$0]; next}
+        !($(NF - 1) "::" $NF in is_said) {print page ": names " $0 ", which no source has"}' "$work/names" - >>"$faults"
   done
   for page in docs/*.md; do
     grep -qF "($page)" README.md || grep -qF "($(basename "$page"))" docs/*.md ||
@@ -108,15 +129,17 @@ options_of_section() {
 }
 
 check_section() { # HEADING COMMAND...
-  local heading=$1 line help
+  local heading=$1 line
+  options_of_section "$heading" >"$work/written"
   shift
-  help=$(help_of "$@" | sed '/^Examples:/,$d') || fault "$*: has no --help"
+  help_of "$@" | sed '/^Examples:/,$d' >"$work/help" || fault "$*: has no --help"
+  options_of_help <"$work/help" >"$work/offered"
   while read -r line; do
     fault "docs/programs.md: '$heading' does not have $line, which $(basename "$1")${2:+ $2} has"
-  done < <(comm -13 <(options_of_section "$heading") <(options_of_help <<<"$help"))
+  done < <(comm -13 "$work/written" "$work/offered")
   while read -r line; do
     fault "docs/programs.md: '$heading' has $line, which $(basename "$1")${2:+ $2} does not have"
-  done < <(comm -23 <(options_of_section "$heading") <(options_of_help <<<"$help"))
+  done < <(comm -23 "$work/written" "$work/offered")
 }
 
 check_options() {
@@ -139,8 +162,9 @@ check_options() {
   printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"
   for page in "${pages[@]}"; do
     while read -r option; do
-      grep -qxF -- "$option" "$known" || fault "$page: names $option, which no program or script has"
-    done < <(grep -oE '(^|[ `(])--[a-z][a-z0-9-]+' "$page" | grep -oE -- '--[a-z][a-z0-9-]+' | sort -u)
+      fault "$page: names $option, which no program or script has"
+    done < <(grep -oE '(^|[ `(])--[a-z][a-z0-9-]+' "$page" | grep -oE -- '--[a-z][a-z0-9-]+' | sort -u |
+      comm -23 - <(sort -u "$known"))
   done
   rm -f "$known"
 }

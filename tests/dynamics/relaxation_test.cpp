@@ -30,11 +30,11 @@ material::HyperelasticMaterial exponential() {
 }
 
 // A cube of a measured material, free.
-organ::Organ measured_cube(bool is_averaged,
-                           const material::HyperelasticMaterial& material = liver()) {
+organ::Organ measured_cube(bool is_averaged, const material::HyperelasticMaterial& material,
+                           int cells) {
   organ::Organ organ;
   organ.name = "cube";
-  organ.mesh = trocar::testing::block_mesh(2, kSide_m / 2);
+  organ.mesh = trocar::testing::block_mesh(cells, kSide_m / cells);
   mesh::centre_on_origin(organ.mesh);
   material::use_measured(material, organ.material);
   organ.material.has_averaged_strain = is_averaged;
@@ -48,13 +48,22 @@ using Stretch = std::array<Vec3d, 3>;  // rows
 // Whether strain is averaged: where it is the same everywhere, nothing may depend on that.
 class LiveRelaxation : public ::testing::TestWithParam<bool> {};
 
+// Forces of relaxed stress are taken where the tissue is in each step, or as a solver has them:
+// where it was when the step before ended, each node that is not near in its turn.
+enum class ForcesAre { Exact, AsSolved };
+
 // The cube in a homogeneous deformation that changes with time, step by step.
 class Specimen {
  public:
   // Far tissue is advanced in turns.
   Specimen(bool is_averaged, bool is_near, const material::HyperelasticMaterial& material = liver())
-      : organ_(measured_cube(is_averaged, material)),
-        tissue_(organ_),
+      : Specimen(measured_cube(is_averaged, material, 2), is_near, ForcesAre::Exact,
+                 StrainScheme::Implicit) {}
+  Specimen(organ::Organ organ, bool is_near, ForcesAre forces, StrainScheme scheme)
+      : organ_(std::move(organ)),
+        forces_are_(forces),
+        scheme_(scheme),
+        tissue_(organ_, scheme),
         state_(organ_),
         x_(tissue_.groups().slot_count()) {
     for (Group g = 0; g < tissue_.groups().group_count() && is_near; ++g)
@@ -75,12 +84,17 @@ class Specimen {
     Vec3d force;
     if (auto* const strain = tissue_.nodal_strain())
       for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x_.data());
+    const bool is_explicit = scheme_ == StrainScheme::Explicit;
+    for (Group g = 0; g < groups.group_count() && is_explicit; ++g)
+      tissue_.update_nodal_stress(g, x_.data());
     for (Group g = 0; g < groups.group_count(); ++g) {
       NodeStep8 step{zero_vec8(), zero_sym_mat8()};
       tissue_.begin_group(g, x_.data(), 0);
       tissue_.add(g, x_.data(), load_group(&x_[g * kLanes]), step);
+      if (is_explicit) step.gradient = step.gradient + tissue_.nodal_forces(g).gradient;
       Vec3Lanes gradients;
-      tissue_.relaxed_stress()->refresh({g, 0xff}, x_.data(), state_);
+      if (forces_are_ == ForcesAre::Exact)
+        tissue_.relaxed_stress()->refresh({g, 0xff}, x_.data(), state_);
       store(gradients, step.gradient - tissue_.relaxed_stress()->forces(g));
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const auto node = groups.nodes_of(g)[lane];
@@ -89,6 +103,9 @@ class Specimen {
       }
     }
     relaxation.end_step(x_.data(), near_, state_, workers_);
+    for (Group g = 0; g < groups.group_count() && forces_are_ == ForcesAre::AsSolved; ++g)
+      if (!near_.empty() || relaxation.is_turn_of(g, state_.step()))
+        tissue_.relaxed_stress()->refresh({g, 0xff}, x_.data(), state_);
     EXPECT_TRUE(is_finite(force));  // the worst of what is not a number is nothing
     return force;
   }
@@ -103,6 +120,8 @@ class Specimen {
                                           state_);
     return {state_.forces().begin(), state_.forces().end()};
   }
+  // Forgets all that is not in the state, as a restore does.
+  void restart() { tissue_.relaxation()->restart(); }
   RelaxationFigures figures() const { return *tissue_.relaxation_figures(); }
   // Returns the energy above that at rest.
   double energy_j() const {
@@ -115,6 +134,8 @@ class Specimen {
 
  private:
   organ::Organ organ_;
+  ForcesAre forces_are_;
+  StrainScheme scheme_;
   Tissue tissue_;
   world::RelaxationState state_;
   std::vector<Float4> x_;
@@ -169,6 +190,63 @@ TEST_P(LiveRelaxation, InTurnsTissueFollowsTheSeriesATurnLateAtMost) {
   // 8 ms of the fastest relaxation there is, and of what there is after 5 s.
   EXPECT_LT(worst, 9e-3);
   EXPECT_LT(worst_late, 5e-4);
+}
+
+// The largest errors of a force in turns, in parts of the largest force.
+struct TurnErrors {
+  double ramp_end = 0, hold = 0, reversed = 0;
+};
+// Sheared within `ramp` seconds, held for 40 steps, and sheared back as fast to the other side.
+TurnErrors errors_of_turns(const organ::Organ& organ, StrainScheme scheme, double dt, double ramp) {
+  constexpr double kShear = 1e-3;
+  constexpr int kHold = 40;
+  Specimen every(organ, true, ForcesAre::AsSolved, scheme),
+      turns(organ, false, ForcesAre::AsSolved, scheme);
+  const int n = static_cast<int>(std::lround(ramp / dt));
+  TurnErrors errors;
+  double largest = 0;
+  for (int i = 1; i <= 3 * n + kHold; ++i) {
+    const double shear = kShear * (i <= n           ? static_cast<double>(i) / n
+                                   : i <= n + kHold ? 1
+                                                    : 1 - static_cast<double>(i - n - kHold) / n);
+    const Stretch f{Vec3d{1, 0, 0}, Vec3d{shear, 1, 0}, Vec3d{0, 0, 1}};
+    const double right = every.step(f, dt).y, off = std::abs(turns.step(f, dt).y - right);
+    largest = std::max(largest, std::abs(right));
+    if (i == n) errors.ramp_end = off;
+    if (i > n + kHold / 2 && i <= n + kHold) errors.hold = std::max(errors.hold, off);
+    if (i > n + kHold) errors.reversed = std::max(errors.reversed, off);
+  }
+  return {errors.ramp_end / largest, errors.hold / largest, errors.reversed / largest};
+}
+
+TEST_P(LiveRelaxation, ForcesInTurnsAreOnAverageThoseOfEveryStep) {
+  const auto organ = measured_cube(GetParam(), liver(), 8);
+  for (const auto scheme : {StrainScheme::Implicit, StrainScheme::Explicit}) {
+    const bool is_explicit = scheme == StrainScheme::Explicit;
+    if (is_explicit && !GetParam()) continue;
+    for (const double dt : {0.0005, 0.001})
+      for (const double ramp : {0.01, 0.02, 0.05, 0.1}) {
+        const auto errors = errors_of_turns(organ, scheme, dt, ramp);
+        std::printf(
+            "%s, step %.1f ms, ramp of %3.0f ms: its end %.3f %%, held %.3f %%, back %.3f %%\n",
+            is_explicit ? "explicit" : "implicit", dt * 1e3, ramp * 1e3, 100 * errors.ramp_end,
+            100 * errors.hold, 100 * errors.reversed);
+        // Nodes that wait a turn too know little of what comes within little more than a turn.
+        const bool is_sudden = !is_explicit && ramp < 12 * dt;
+        EXPECT_LT(errors.ramp_end, is_sudden ? 2.5e-3 : 1e-3);
+        EXPECT_LT(errors.hold, 1e-3);
+        EXPECT_LT(errors.reversed, is_sudden ? 2e-3 : 1e-3);
+      }
+  }
+}
+
+TEST_P(LiveRelaxation, ForcesInTurnsFollowFromTheStateAlone) {
+  const Stretch f{Vec3d{1.2, 0.1, 0}, {0.05, 0.9, 0}, {0, -0.1, 0.95}};
+  Specimen goes_on(GetParam(), false), restored(GetParam(), false);
+  for (int i = 0; i < 40; ++i) {
+    if (i > 20) restored.restart();
+    EXPECT_EQ(goes_on.step(f, 0.001), restored.step(f, 0.001)) << i;
+  }
 }
 
 // Stretched at constant volume to 1.3 times its length in half a second, held, and let back.
@@ -255,7 +333,7 @@ TEST_P(LiveRelaxation, ForcesOfANodeDoNotDependOnWhichOthersAreTaken) {
 }
 
 TEST_P(LiveRelaxation, WhatIsNotLoadedDoesNotMoveInAMinute) {
-  auto organ = measured_cube(GetParam());
+  auto organ = measured_cube(GetParam(), liver(), 2);
   for (std::uint32_t n = 0; n < organ.mesh.node_count(); ++n)
     if (organ.mesh.rest_positions[n].y < -0.49 * kSide_m) organ.fixed_nodes.push_back(NodeIndex(n));
   world::World world(organ);
@@ -274,7 +352,7 @@ TEST_P(LiveRelaxation, WhatIsNotLoadedDoesNotMoveInAMinute) {
 }
 
 TEST_P(LiveRelaxation, TissueUnderTensionBeginsRelaxed) {
-  auto organ = measured_cube(GetParam());
+  auto organ = measured_cube(GetParam(), liver(), 2);
   organ.material.tension = 0.05;
   world::World world(organ);
   start_relaxed(organ, world);

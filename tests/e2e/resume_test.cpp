@@ -165,7 +165,15 @@ TEST(ResumedLesson, GoesOnWithStageTimeAndPoints) {
       << read_text(log);
   EXPECT_TRUE(wait_until(
       [&] { return read_text(log).find("Anna (surgeon) is back") != std::string::npos; }, 30));
-  // A second time, from the recording that knows the second half alone.
+  // A second time, from the recording that knows the second half alone, once it holds a second of
+  // it: with nothing at all nobody could go on.
+  ASSERT_TRUE(wait_until(
+      [&] {
+        const auto journal = journal::SessionJournal::open(next.string());
+        return journal.ok() &&
+               (*journal)->info().last_tick > (*journal)->info().begin_tick() + kTicksPerSecond;
+      },
+      30));
   server.signal(SIGKILL);
   EXPECT_EQ(server.wait(10), 128 + SIGKILL);
   const auto told_last = stages_in(next).back();

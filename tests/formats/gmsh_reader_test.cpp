@@ -70,6 +70,9 @@ TEST(GmshReader, ErrorsSayWhereAndWhat) {
     EXPECT_NE(message(text).find(part), std::string::npos) << part << " / " << message(text);
   };
   expect("", "a.msh: is empty");
+  for (const auto* version : {"2.000000 0 8", "2 0 8", "2.1 0 8"})
+    EXPECT_TRUE(parse_gmsh(replaced(good, "2.2 0 8", version), "a.msh").ok()) << version;
+  expect(replaced(good, "2.2 0 8", "2.3 0 8"), "a.msh:2: is Gmsh version '2.3'");
   expect(replaced(good, "2.2 0 8", "4.0 0 8"), "a.msh:2: is Gmsh version '4.0'");
   expect(replaced(good, "2.2 0 8", "2.2 1 8"), "the byte order is not that of this machine");
   expect(replaced(good, "2.2 0 8", "2.2 0 4"), "a.msh:2: format line");
@@ -92,6 +95,7 @@ TEST(GmshReader, ErrorsSayWhereAndWhat) {
   expect(kHead + kNodes + kNodes + kElements, "a second $Nodes");
   expect(kHead + kNodes + kElements + kElements, "a second $Elements");
   expect(kHead + "loose\n" + kNodes + kElements, "a.msh:4: 'loose' is outside any section");
+  expect(kHead + "$ParametricNodes\n1\n", "a.msh:4: has $ParametricNodes: save the mesh without");
   expect(kHead + "$Odd\n1\n" + kNodes + kElements, "a.msh:4: section '$Odd' is never closed");
   expect(kHead + kNodes, "without an $Elements");
   expect(replaced(good, "2 1 0 0", std::string("2 \x1b[31m 0 0")), "coordinate '?[31m'");

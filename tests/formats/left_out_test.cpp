@@ -52,14 +52,15 @@ TEST(LeftOut, SetsOfElementsAreTakenInTheOrderOfTheFile) {
 }
 
 TEST(LeftOut, SetsOfTrianglesAreSetsOfNodes) {
-  const auto mesh = imported(kDeck +
-                                 "*ELEMENT, TYPE=CPS3, ELSET=Surface1\n3,1,2,4\n4,1,3,4\n"
-                                 "*ELEMENT, TYPE=T3D2\n5,1,2\n*ELSET, ELSET=hilum\n3\n",
-                             "a.inp");
+  const auto mesh = imported(
+      kDeck +
+          "*ELEMENT, TYPE=CPS3, ELSET=Surface1\n3,1,2,4\n4,1,3,4\n"
+          "*ELEMENT, TYPE=T3D2\n5,1,2\n*ELEMENT, TYPE=R3D3\n6,1,2,3\n*ELSET, ELSET=hilum\n3\n",
+      "a.inp");
   ASSERT_EQ(names_of(mesh.node_sets), (Lines{"Surface1", "hilum"}));
   EXPECT_EQ(mesh.node_sets[0].nodes.size(), 4u);
   EXPECT_EQ(mesh.node_sets[1].nodes, (std::vector{NodeIndex(0), NodeIndex(1), NodeIndex(3)}));
-  EXPECT_EQ(mesh.left_out, Lines{"left out 1 triangles and lines of no set"});
+  EXPECT_EQ(mesh.left_out, Lines{"left out 2 triangles and lines of no set"});
 }
 
 TEST(LeftOut, LinesThatEndWithACommaGoOn) {
@@ -107,15 +108,44 @@ TEST(LeftOut, AnEntityMayBeInSeveralPhysicalGroups) {
                                   "left out: '$NodeData'"}));
 }
 
-TEST(LeftOut, ATetThatIsListedInTwoGroupsIsSaid) {
+// Gmsh 2.2 lists it once for each group, 4.1 says the groups of the entity.
+TEST(LeftOut, ATetThatIsListedOnceForEachGroupIsOneOfTheLast) {
   const auto mesh = imported(
       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
       "5 0 0 -1\n$EndNodes\n$Elements\n3\n1 4 2 7 1 1 2 3 4\n2 4 2 8 1 1 3 2 5\n"
       "1 4 2 9 1 1 2 3 4\n$EndElements\n",
       "a.msh");
-  EXPECT_EQ(names_of(mesh.regions), (Lines{"region 7", "region 8"}));
-  EXPECT_EQ(mesh.warnings,
-            Lines{"dropped 1 tets that were listed twice, 1 of them in another region"});
+  EXPECT_EQ(names_of(mesh.regions), (Lines{"region 8", "region 9"}));
+  EXPECT_EQ(mesh.mesh.tets.size(), 2u);
+  EXPECT_EQ(mesh.left_out, Lines{"an element belongs to the last region that holds it, so these "
+                                 "keep fewer: 'region 7: 0 of 1'"});
+  EXPECT_EQ(mesh.warnings, Lines{});
+}
+
+TEST(LeftOut, VolumesOfNoPhysicalGroupAreSaid) {
+  const auto mesh = imported(
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
+      "5 0 0 -1\n$EndNodes\n$Elements\n2\n1 4 2 0 1 1 2 3 4\n2 4 2 0 2 1 3 2 5\n$EndElements\n",
+      "a.msh");
+  EXPECT_EQ(mesh.left_out, Lines{"no regions: its 2 volumes are in no physical group"});
+}
+
+TEST(LeftOut, WhatSurfacesHaveBesideTheirShapeIsSaid) {
+  const auto said = [](const std::string& text, const std::string& name) {
+    const auto file = parse_mesh(text, name);
+    EXPECT_TRUE(file.ok()) << file.error().message;
+    return file.ok() ? std::get<surface::RawSurface>(*file).left_out : Lines{};
+  };
+  EXPECT_EQ(said("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                 "property float z\nproperty float nx\nproperty uchar red\nelement face 1\n"
+                 "property list uchar int vertex_indices\nproperty int label\nend_header\n"
+                 "0 0 0 0 1\n1 0 0 0 2\n0 1 0 0 3\n3 0 1 2 7\n",
+                 "a.ply"),
+            (Lines{"left out of each vertex: 'red'", "left out of each face: 'label'"}));
+  const std::string corners = "o all\nv 0 0 0\nv 1 0 0\nv 0 1 0\n", face = "f 1 2 3\n";
+  EXPECT_EQ(said(corners + "usemtl a\n" + face, "a.obj"), Lines{});
+  EXPECT_EQ(said(corners + "g lobe\n" + face + "g vein\n" + face, "a.obj"),
+            Lines{"left out g: 'lobe', 'vein'"});
 }
 
 std::string of_vtk(const std::string& data) {

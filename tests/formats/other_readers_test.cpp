@@ -31,6 +31,16 @@ TEST(MeditReader, ReadsTetsRegionsAndSets) {
   EXPECT_EQ(raw->node_sets[1].nodes, std::vector{NodeIndex(3)});
 }
 
+TEST(MeditReader, EachBlockMayHaveItsListOfTets) {
+  const auto text =
+      changed(changed(kMedit, "Vertices\n4", "Vertices\n5"), "0 0 1 9\n", "0 0 1 9\n0 0 -1 0\n");
+  const auto raw =
+      parse_medit(changed(text, "Corners", "Tetrahedra\n1\n1 3 2 5 8\nCorners"), "a.mesh");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  EXPECT_EQ(raw->tet_regions, (std::vector<std::int64_t>{7, 8}));
+  EXPECT_EQ(raw->element_ids, (std::vector<std::int64_t>{1, 2}));
+}
+
 TEST(MeditReader, ErrorsSayWhereAndWhat) {
   const auto expect = [](const std::string& text, const char* part) {
     ASSERT_FALSE(text.empty()) << part;

@@ -58,6 +58,41 @@ TEST(VtkReader, ReadsBinaryAndNoPartOfIt) {
     EXPECT_FALSE(parse_mesh(std::string_view(text).substr(0, n), "a.vtk").ok()) << n;
 }
 
+// VTK writes each of these kinds.
+TEST(VtkReader, DataOfEachKindAreReadOverAndSaid) {
+  const auto raw = tets_in(
+      kVtk +
+          "COLOR_SCALARS paint 3\n0 0 0 0 0 0 0 0 0 0 0 0\nLOOKUP_TABLE hues 2\n0 0 0 1 1 1 1 1\n"
+          "TEXTURE_COORDINATES uv 2 float\n0 0 1 0 1 1 0 1\nGLOBAL_IDS ids vtkIdType\n0 1 2 3\n"
+          "TENSORS6 s float\n1 2 3 4 5 6 1 2 3 4 5 6 1 2 3 4 5 6 1 2 3 4 5 6\n"
+          "FIELD more 2\nnames 1 4 string\na b\n\nc\nd\nflags 1 4 bit\n0 1 1 0\n",
+      "a.vtk");
+  expect_the_tet(raw);
+  EXPECT_EQ(raw.left_out.back(),
+            "left out: cell data 'other', point data 'u', point data 'paint', point data 'hues', "
+            "point data 'uv', point data 'ids', point data 's', point data 'names', point data "
+            "'flags'");
+}
+
+TEST(VtkReader, RegionsComeBehindBinaryDataOfNoFixedSize) {
+  std::string text = changed(kVtk51, "ASCII", "BINARY");
+  text.resize(text.find("0 0 0 1 0 0"));
+  for (const float c : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f})
+    put_big_endian(text, c);
+  text += "\nCELLS 2 4\nOFFSETS vtktypeint64\n";
+  for (const std::int64_t i : {0, 4}) put_big_endian(text, i);
+  text += "\nCONNECTIVITY vtktypeuint8\n" + std::string("\0\1\2\3", 4) + "\nCELL_TYPES 1\n";
+  put_big_endian(text, std::int32_t{10});
+  // A length below 64 has one byte, one below 16,384 two.
+  text += "\nCELL_DATA 1\nFIELD f 4\nshort 1 1 string\n\xc5liver\nlong 1 1 string\n\x80\x46" +
+          std::string(70, 'x') + "\nflags 3 1 bit\n\xa0\nregion 1 1 vtktypeuint8\n\xc8\n";
+  const auto raw = tets_in(text, "a.vtk");
+  expect_the_tet(raw);
+  EXPECT_EQ(raw.tet_regions, std::vector<std::int64_t>{200});
+  for (std::size_t n = text.find("short"); n + 1 < text.size(); ++n)
+    EXPECT_FALSE(parse_mesh(std::string_view(text).substr(0, n), "a.vtk").ok()) << n;
+}
+
 TEST(VtkReader, ErrorsSayWhereAndWhat) {
   const auto expect = [](const std::string& text, const char* part) {
     ASSERT_FALSE(text.empty()) << part;
@@ -141,6 +176,44 @@ TEST(VtuReader, ReadsBase64PackedOrNot) {
       << error_of(damaged, "a.vtu");
 }
 
+TEST(VtuReader, ReadsBothByteOrders) {
+  for (const bool is_wide : {false, true}) {
+    std::string bytes;
+    if (is_wide)
+      put_big_endian(bytes, std::uint64_t{kCoordinates.size()});
+    else
+      put_big_endian(bytes, static_cast<std::uint32_t>(kCoordinates.size()));
+    for (const double c : {0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.})
+      put_big_endian(bytes, c);
+    const auto text =
+        with_points(base64(bytes), "\"binary\"", is_wide ? "header_type=\"UInt64\"" : "");
+    expect_the_tet(tets_in(changed(text, "LittleEndian", "BigEndian"), "a.vtu"));
+  }
+}
+
+TEST(VtuReader, ArraysOfTextsAreLeftOutAndSaid) {
+  const auto raw = tets_in(changed(kVtu, "<PointData>",
+                                   "<FieldData><Array type=\"String\" Name=\"who\" "
+                                   "format=\"ascii\">65 0</Array></FieldData><PointData>"),
+                           "a.vtu");
+  EXPECT_EQ(raw.left_out, std::vector<std::string>{"left out: field data 'who', point data 'u'"});
+}
+
+TEST(VtuReader, PiecesAreOneMesh) {
+  const auto begin = kVtu.find("<Piece"), end = kVtu.find("</UnstructuredGrid>");
+  const auto second = changed(kVtu.substr(begin, end - begin), ">7<", ">8<");
+  const std::string none = "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"></Piece>\n";
+  const auto raw =
+      tets_in(changed(kVtu, "</UnstructuredGrid>",
+                      none + changed(second, "0 0 0 1 0 0", "0 0 5 1 0 0") + "</UnstructuredGrid>"),
+              "a.vtu");
+  ASSERT_EQ(raw.tets.size(), 2u);
+  EXPECT_EQ(raw.positions[4], (Vec3d{0, 0, 5}));
+  EXPECT_EQ(raw.tets[1], (mesh::Tet{NodeIndex(4), NodeIndex(5), NodeIndex(6), NodeIndex(7)}));
+  EXPECT_EQ(raw.tet_regions, (std::vector<std::int64_t>{7, 8}));
+  EXPECT_EQ(raw.left_out, std::vector<std::string>{"left out: point data 'u'"});
+}
+
 TEST(VtuReader, ReadsAppendedData) {
   const auto size = static_cast<std::uint32_t>(kCoordinates.size());
   const std::string framed = bytes_from({size}) + kCoordinates;
@@ -161,7 +234,7 @@ TEST(VtuReader, ErrorsSayWhat) {
   };
   expect("<a>", "does not begin with a VTKFile element");
   expect(changed(kVtu, "UnstructuredGrid", "PolyData"), "is of type 'PolyData'");
-  expect(changed(kVtu, "LittleEndian", "BigEndian"), "byte_order must be LittleEndian");
+  expect(changed(kVtu, "LittleEndian", "Middle"), "byte_order must be LittleEndian or BigEndian");
   expect(changed(kVtu, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\""),
          "12 numbers, the piece announces 4000000000 points");
   expect(changed(kVtu, "NumberOfCells=\"1\"", "NumberOfCells=\"2\""), "the piece announces 2");

@@ -15,6 +15,7 @@
 #include "server/app/server/options.h"
 #include "server/app/server/pacer.h"
 #include "server/app/server/simulation_loop.h"
+#include "server/session/recording/tick_records.h"
 #include "tests/network/session_fixture.h"
 
 namespace trocar::testing {
@@ -29,7 +30,7 @@ TEST(Pacer, on_time_ticks_are_a_millisecond_apart_and_never_slow) {
   EXPECT_EQ(pacer.slow_ticks(), 0u);
 }
 
-TEST(Pacer, after_a_stall_two_ticks_run_back_to_back_and_the_rest_is_given_up) {
+TEST(Pacer, after_a_stall_a_frame_is_caught_up_with_and_the_rest_is_given_up) {
   app::Pacer pacer(0);
   pacer.begin_tick(0);
   const std::uint64_t late = 50 * kTickNanoseconds;  // ticks 1 to 50 are due
@@ -38,9 +39,21 @@ TEST(Pacer, after_a_stall_two_ticks_run_back_to_back_and_the_rest_is_given_up) {
     pacer.begin_tick(late);
     ++at_once;
   }
-  EXPECT_EQ(at_once, 2);
-  EXPECT_EQ(pacer.slow_ticks(), 48u);
+  EXPECT_EQ(at_once, 16);
+  EXPECT_EQ(pacer.slow_ticks(), 34u);
   EXPECT_EQ(pacer.due_ns(), late + kTickNanoseconds);
+}
+
+TEST(Pacer, a_long_tick_that_those_after_it_make_up_for_slows_nothing) {
+  app::Pacer pacer(0);
+  std::uint64_t now = 0;
+  for (int tick = 0; tick < 2000; ++tick) {
+    now = std::max(now, pacer.due_ns());
+    pacer.begin_tick(now);
+    now += tick % 20 == 0 ? 7'000'000 : 600'000;
+  }
+  EXPECT_EQ(pacer.slow_ticks(), 0u);
+  EXPECT_EQ(pacer.due_ns(), 2000 * kTickNanoseconds);
 }
 
 TEST(Pacer, a_rate_stretches_the_time_between_ticks) {
@@ -61,7 +74,7 @@ TEST(Pacer, faster_than_real_time_nothing_is_late) {
   EXPECT_EQ(pacer.due_ns(), kTickNanoseconds / 10);
   pacer.begin_tick(50 * kTickNanoseconds);
   EXPECT_EQ(pacer.slow_ticks(), 0u);
-  EXPECT_GT(pacer.due_ns(), 49 * kTickNanoseconds) << "and nothing is made up for";
+  EXPECT_GE(pacer.due_ns(), 48 * kTickNanoseconds) << "and little is made up for";
 }
 
 TEST(Pacer, random_stalls_keep_the_books) {
@@ -77,7 +90,7 @@ TEST(Pacer, random_stalls_keep_the_books) {
       ++ticks;
       // Ticks and given-up ticks together are the milliseconds that have passed.
       EXPECT_EQ(pacer.due_ns(), (ticks + pacer.slow_ticks()) * kTickNanoseconds);
-      EXPECT_LE(now, pacer.due_ns() + kTickNanoseconds) << "more than one tick left to catch up";
+      EXPECT_LE(now, pacer.due_ns() + 15 * kTickNanoseconds) << "more than a frame is caught up";
       now += random() % 5 == 0 ? random() % (20 * kTickNanoseconds) : random() % 900'000;
     }
   }
@@ -247,6 +260,45 @@ TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
   std::vector<step::SharedFrame> handed;
   handover.pop_all(handed);
   EXPECT_EQ(handed, sink.frames);
+}
+
+// On a machine whose ticks take all the time there is.
+TEST(SimulationLoop, a_blade_that_is_too_fast_waits_and_the_recording_knows) {
+  const auto organ = *catalogue::make_liver(1500);
+  step::Simulation simulation(organ);
+  participants::SimulationInbox inbox;
+  app::FrameHandover handover([] {});
+  KeepingSink sink;
+  std::uint64_t now_ns = 0;
+  app::LoopOptions options{.rate = control::RateLimits{}, .tick_count = 480};
+  options.clock_ns = [&now_ns] { return now_ns += kTickNanoseconds; };
+  app::SimulationLoop loop(simulation, inbox, handover, &sink, options, [] {});
+  hands::HandJoin join{.slot = {1}};
+  join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.1f};
+  ASSERT_TRUE(inbox.try_push_join(join));
+  for (int tick = 0; tick < 480; ++tick) {
+    const float x = -0.12f + 0.0005f * static_cast<float>(tick);
+    inbox.push_sample(
+        {tool_slot({1}, 0), {{{x, 0, 0}, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
+    loop.run_tick();
+  }
+  EXPECT_GT(loop.report().rate.waits[2], 100u);
+  EXPECT_EQ(loop.report().rate.waits[0], 0u);
+  EXPECT_EQ(sink.frames.back()->figures.pace.rate.waiting_blades, 4u);
+
+  step::Simulation again(organ);
+  std::uint32_t waited = 0;
+  for (const auto& frame : sink.frames)
+    for (const auto& record : frame->records) {
+      proto::TickRecord message;
+      recording::to_message(record, nullptr, message);
+      step::TickRecord read;
+      ASSERT_TRUE(recording::from_message(message, read).ok());
+      ASSERT_EQ(read.decisions, record.decisions);
+      waited |= read.decisions.waiting_blades;
+      ASSERT_EQ(again.tick(read.inputs, read.decisions).state_hash, record.state_hash);
+    }
+  EXPECT_EQ(waited, 4u);
 }
 
 TEST(SimulationLoop, a_later_snapshot_restores_to_the_hashes_that_follow) {

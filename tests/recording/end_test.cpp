@@ -10,7 +10,6 @@
 
 #include "common/base/exit_code.h"
 #include "common/journal/mcap_copy.h"
-#include "common/journal/mcap_writer.h"
 #include "common/journal/recording_end.h"
 #include "common/journal/session_journal.h"
 #include "common/secure/signing.h"
@@ -18,6 +17,7 @@
 #include "server/session/recording/recorder.h"
 #include "server/session/recording/verify.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/recording/forged_recording.h"
 #include "tests/recording/recorded_simulation.h"
 #include "tests/support/files.h"
 #include "tests/support/program_fixture.h"
@@ -37,41 +37,6 @@ using trocar::testing::TemporaryFolder;
 constexpr auto kNotVerified = static_cast<int>(ExitCode::NotVerified);
 constexpr auto kMismatch = static_cast<int>(ExitCode::Mismatch);
 constexpr auto kBadFile = static_cast<int>(ExitCode::BadFile);
-
-using KeepsMessage = std::function<bool(const McapChannel&, const McapMessage&)>;
-using KeepsMetadata = std::function<bool(McapMetadata&)>;
-
-const auto kAllMessages = [](const McapChannel&, const McapMessage&) { return true; };
-const auto kAllMetadata = [](McapMetadata&) { return true; };
-
-// Writes some of a recording again, with index, summary and CRCs that are right.
-void forge(const std::string& from, const std::string& to, const KeepsMessage& keeps,
-           const KeepsMetadata& keeps_metadata = kAllMetadata) {
-  auto reader = journal::McapReader::open(from);
-  ASSERT_TRUE(reader.ok());
-  auto writer = journal::McapWriter::create(to, (*reader)->header());
-  ASSERT_TRUE(writer.ok());
-  for (auto metadata : (*reader)->metadata()) {
-    if (!keeps_metadata(metadata)) continue;
-    ASSERT_TRUE((*writer)->write_metadata(metadata).ok());
-  }
-  std::map<std::uint16_t, std::uint16_t> ids;
-  for (const auto& [id, channel] : (*reader)->channels()) {
-    const auto& schema = (*reader)->schemas().at(channel.schema_id);
-    ids[id] =
-        (*writer)->add_channel(channel.topic, channel.message_encoding,
-                               (*writer)->add_schema(schema.name, schema.encoding, schema.data));
-  }
-  (*reader)->read({}, {}, [&](const McapMessage& message) {
-    if (!keeps((*reader)->channels().at(message.channel_id), message)) return true;
-    EXPECT_TRUE((*writer)
-                    ->write(ids.at(message.channel_id), message.log_time, message.publish_time,
-                            message.data)
-                    .ok());
-    return true;
-  });
-  ASSERT_TRUE((*writer)->close().ok());
-}
 
 // Writes a key pair as openssl's own program does.
 void make_keys(const std::string& private_file, const std::string& public_file,

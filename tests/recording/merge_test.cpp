@@ -13,6 +13,7 @@
 #include "common/base/bytes.h"
 #include "common/base/checksum.h"
 #include "common/base/version.h"
+#include "common/journal/recording_end.h"
 #include "common/journal/session_journal.h"
 #include "common/journal/session_journal_writer.h"
 #include "proto/journal.pb.h"
@@ -21,6 +22,7 @@
 #include "server/session/recording/session_parts.h"
 #include "server/session/recording/verify.h"
 #include "tests/recording/continued_session.h"
+#include "tests/recording/forged_recording.h"
 #include "tests/recording/read_recording.h"
 #include "tests/recording/recorded_simulation.h"
 #include "tests/support/files.h"
@@ -209,6 +211,59 @@ TEST_F(Merge, RefusesPartsThatDoNotContinueEachOther) {
   copy_journal(parts.first, folder_.file("session.mcap"), kAll, kSimVersion + 1);
   expect_refusal({folder_.file("session.mcap"), folder_.file("session-2.mcap")},
                  "was recorded by another release");
+}
+
+// A merged recording gets a right end, which a part that was changed must not come by.
+TEST_F(Merge, RefusesAPartThatIsNotWhatItsEndSays) {
+  const auto& parts = dry();
+  const std::vector<std::string> here{folder_.file("session.mcap"), folder_.file("session-2.mcap"),
+                                      folder_.file("session-3.mcap")};
+  fs::copy(parts.first, here[0]);
+  fs::copy(parts.second, here[1]);
+  files_ = 3;
+  const auto is_frame = [](const journal::McapChannel& channel) {
+    return channel.topic == journal::topic_name(journal::JournalTopic::FrameState);
+  };
+  const auto refused = [&](const char* says, const KeepsMessage& keeps,
+                           const KeepsMetadata& keeps_metadata = kAllMetadata) {
+    forge(parts.third, here[2], keeps, keeps_metadata);
+    expect_refusal(here, says);
+    fs::remove(here[2]);
+  };
+  std::uint64_t last = 0;
+  forge(parts.third, here[2], [&](auto&, const journal::McapMessage& message) {
+    last = std::max(last, message.log_time);
+    return true;
+  });
+  ASSERT_TRUE(merge(here, to_).ok()) << "a copy is no change";
+  fs::remove(to_);
+  fs::remove(here[2]);
+  constexpr std::uint64_t kSecond_ns = 1'000'000'000;
+  refused("messages, the end of the recording counts",
+          [&](auto&, const auto& message) { return message.log_time + kSecond_ns / 2 < last; });
+  refused("messages, the end of the recording counts",
+          [&](const auto& channel, auto&) { return !is_frame(channel); });
+  std::vector<std::uint8_t> altered;
+  refused("messages_sha256: is ", [&](const auto& channel, journal::McapMessage& message) {
+    if (!altered.empty() || !is_frame(channel)) return true;
+    altered.assign(message.data.begin(), message.data.end());
+    altered.back() ^= 1;
+    message.data = altered;
+    return true;
+  });
+  refused("metadata_sha256: is ", kAllMessages, [](journal::McapMetadata& metadata) {
+    if (metadata.name == journal::kSessionMetadataName) metadata.entries["organ_name"] = "kidney";
+    return true;
+  });
+  refused("the end that counts its messages was taken out", kAllMessages,
+          [](const journal::McapMetadata& metadata) {
+            return metadata.name != journal::kEndMetadataName;
+          });
+  // A part of a killed server has no end, but is not closed, either.
+  fs::copy(parts.third, here[2]);
+  fs::remove(here[0]);
+  forge(parts.first, here[0], [&](const auto& channel, auto&) { return !is_frame(channel); });
+  expect_refusal(here, "the end that counts its messages was taken out");
 }
 
 // A part that was not written by a server: its messages come before the place where it goes on.

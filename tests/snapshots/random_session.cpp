@@ -294,6 +294,7 @@ void RandomSession::make_inputs() {
   decisions_.far_interval = 1 + random_.below(3);
   decisions_.is_far_exact = random_.below(4) == 0;
   decisions_.is_reduction_off = random_.below(6) == 0;
+  decisions_.waiting_blades = decisions_.node_limit % 4 == 0 ? decisions_.node_limit / 4 % 16 : 0;
 }
 
 void RandomSession::count_state() {

@@ -39,6 +39,11 @@ class Scene {
   double work_j() const { return work_j_; }
   double turning_j() const { return turning_j_; }
   double most_step_n() const { return most_step_n_; }
+  double area_m2() const { return area_m2_; }
+  // Returns the most since the beginning, m/s.
+  float most_speed_m_s() const { return most_speed_m_s_; }
+  // Bits of tools whose blades are to wait from now on.
+  void wait(std::uint32_t waiting_blades) { decisions_.waiting_blades = waiting_blades; }
   Simulation& simulation() { return simulation_; }
 
   void expect_work() const {
@@ -61,7 +66,9 @@ class Scene {
             {tool_slot({hand}, 0),
              {ways_[hand](static_cast<float>(tick) * 1e-3f), tool::Verb::Cut}});
     }
-    area_m2_ += simulation_.tick(inputs, {}).cut.opened_area_m2;
+    area_m2_ += simulation_.tick(inputs, decisions_).cut.opened_area_m2;
+    most_speed_m_s_ =
+        std::max(most_speed_m_s_, simulation_.state().cuts.cutting_speed_m_s(tool_slot({0}, 0)));
     const auto pose = simulation_.state().tools[tool_slot({0}, 0)].pose;
     const auto& [force, torque] = felt();
     if (tick > 1) {
@@ -80,6 +87,8 @@ class Scene {
   Simulation simulation_;
   float edge_m_;
   std::vector<Way> ways_;
+  TickDecisions decisions_;
+  float most_speed_m_s_ = 0;
   double area_m2_ = 0, work_j_ = 0, turning_j_ = 0, most_step_n_ = 0;
   Pose last_pose_;
   Vec3f last_force_n_;
@@ -142,6 +151,44 @@ TEST(BladeForce, DoesTheWorkOfAStroke) {
         EXPECT_EQ(scene.felt().force_n, Vec3f{}) << "it is through";
         EXPECT_EQ(scene.felt().torque_nm, Vec3f{});
       }
+}
+
+// No step is felt, what was planned is cut, and nothing more until it goes on.
+TEST(BladeForce, OfABladeThatIsToWaitIsAStopThatLetsItBack) {
+  Scene scene(block(0.005), 0.1f, {straight(kLeftOfBlock, kRightOfBlock, 0.1f)});
+  scene.run(0.4f);
+  scene.wait(1);
+  scene.run(0.1f);
+  const double planned_m2 = scene.area_m2();
+  scene.run(0.1f);
+  EXPECT_EQ(scene.area_m2(), planned_m2);
+  // 500 N/m over 20 mm, which is the most.
+  EXPECT_NEAR(static_cast<double>(scene.felt().force_n.x), -10, 0.5);
+  EXPECT_EQ(scene.simulation().state().cuts.cutting_speed_m_s(tool_slot({0}, 0)), 0);
+  Bytes snapshot;
+  scene.simulation().write_snapshot(snapshot);
+  Simulation restored(block(0.005));
+  ASSERT_TRUE(restored.restore_snapshot(snapshot).ok());
+  EXPECT_EQ(restored.state_hash(), scene.simulation().state_hash());
+  scene.wait(0);
+  scene.run(0.3f);
+  EXPECT_GT(scene.area_m2(), planned_m2 + 1e-4) << "it goes on";
+  EXPECT_LE(scene.most_step_n(), static_cast<double>(blades::kMostStep_n) + 1e-4);
+}
+
+// control::BladeWaits has a bound of 0.1 m/s for a surgeon's blade.
+TEST(BladeForce, TellsHowFastABladeGoesThroughWholeTissueHoweverTough) {
+  for (const double energy_j_m2 : {30.0, 750.0}) {
+    SCOPED_TRACE(energy_j_m2);
+    auto organ = block(0.005);
+    organ.material.cut_energy_j_m2 = energy_j_m2;
+    for (const float speed : {0.05f, 0.4f}) {
+      Scene scene(organ, 0.1f, {straight(kLeftOfBlock, kRightOfBlock, speed)});
+      scene.run(0.12f / speed);
+      EXPECT_LT(scene.most_speed_m_s(), 1.2f * speed);
+      EXPECT_GT(scene.most_speed_m_s(), 0.7f * speed);
+    }
+  }
 }
 
 TEST(BladeForce, DoesTheWorkOfAStrokeThroughTheLiver) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/step/law_organs.h"
+
 namespace trocar::step::testing {
 
 // This is how far a scene, or the worst of many, went against the laws.
@@ -26,7 +28,7 @@ struct LawScene {
   LawFigures figures;
 };
 
-inline constexpr int kLawOrgans = 6, kLawWorks = 5, kLawSpeeds = 6;
+inline constexpr int kLawWorks = 5, kLawSpeeds = 6;
 
 // Runs the n-th scene: organs change first, then works, then speeds.
 LawScene run_law_scene(int n);

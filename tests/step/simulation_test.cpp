@@ -226,5 +226,96 @@ TEST(Decisions, OutOfRangeIsRefusedByName) {
   EXPECT_FALSE(validate({.depth_limit = 5000}).ok());
 }
 
+// Presses a capsule into the liver from `out` at 60 mm/s, and holds it still.
+class PressedTip {
+ public:
+  PressedTip(const organ::Organ& organ, const Vec3f& out, float radius_m)
+      : simulation_(organ), out_(out), radius_m_(radius_m) {
+    for (const auto& p : organ.mesh.rest_positions)
+      if (dot(to_float(p), out) > dot(place_, out)) place_ = to_float(p);
+  }
+
+  // The force on it, N; it is `aside_m` from where it was pressed.
+  Vec3f tick(float aside_m) {
+    hands::TickInputs inputs;
+    if (simulation_.current_tick() == 0) {
+      hands::HandJoin join{.slot = {0}};
+      join.shapes[0] = {.radius_m = radius_m_, .length_m = 0.3f};
+      inputs.joins.push_back(join);
+    }
+    depth_m_ = std::min(0.005f, depth_m_ + 0.06e-3f);
+    const Vec3f aside = normalized(cross(out_, Vec3f{0, 1, 0}), {}) * aside_m;
+    hand_ = place_ - out_ * depth_m_ + aside;
+    inputs.samples.push_back({kTool, {{hand_, rotation_from_z(out_)}, tool::Verb::Push}});
+    simulation_.tick(inputs, {});
+    const auto& found = simulation_.context().contact.found;
+    Vec3f force;
+    for (const auto& contact : found.tools)
+      force += contact::reaction_on(found, contact, simulation_.state().world).force_n;
+    return force;
+  }
+  // How far it is from the hand across its way, m.
+  float across_m() const {
+    const Vec3f d = simulation_.state().proxies[kTool].pose.position - hand_;
+    return length(d - out_ * dot(d, out_));
+  }
+
+ private:
+  static constexpr ToolSlot kTool{0};
+  Simulation simulation_;
+  const Vec3f out_;
+  const float radius_m_;
+  Vec3f place_, hand_;
+  float depth_m_ = -0.001f;
+};
+
+// The force on a tip that is held still: its mean, N, and by what part of it it changes in a tick.
+struct HeldForce {
+  float mean_n = 0, median_change = 0, largest_change = 0;
+};
+HeldForce force_held(PressedTip& tip, float aside_m) {
+  constexpr int kTicks = 200;
+  std::vector<float> changes;
+  HeldForce held;
+  Vec3f last = tip.tick(aside_m);
+  for (int i = 0; i < kTicks; ++i) {
+    const Vec3f now = tip.tick(aside_m);
+    changes.push_back(length(now - last) / length(now));
+    held.mean_n += length(now) / kTicks;
+    last = now;
+  }
+  std::ranges::sort(changes);
+  held.median_change = changes[kTicks / 2];
+  held.largest_change = changes.back();
+  return held;
+}
+
+// A thin tip stops at the greatest pressure before it is where the hand is. Held still there, the
+// force on it is as steady as that of a thicker one, and so it is where it was dragged to.
+TEST(Simulation, AThinTipThatIsHeldStillDoesNotBuzz) {
+  const auto organ = *catalogue::make_liver();
+  for (const Vec3f& from : {Vec3f{-1, 0.15f, 0.7f}, {0.1f, 0.9f, 0.4f}, {0.02f, 0.1f, 1}})
+    for (const float radius_m : {0.002f, 0.003f, 0.005f}) {
+      PressedTip tip(organ, normalized(from, {}), radius_m);
+      for (int i = 0; i < 140; ++i) tip.tick(0);
+      const auto pressed = force_held(tip, 0);
+      const float across_m = tip.across_m();
+      EXPECT_LT(pressed.largest_change, 0.005f);
+      constexpr float kDrag_m = 0.03e-3f;
+      for (int i = 1; i <= 100; ++i) tip.tick(kDrag_m * static_cast<float>(i));
+      for (int i = 0; i < 160; ++i) tip.tick(100 * kDrag_m);
+      const auto dragged = force_held(tip, 100 * kDrag_m);
+      for (const auto& [held, across] : {std::pair{pressed, across_m}, {dragged, tip.across_m()}}) {
+        std::printf(
+            "radius %.0f mm: %.4f N, changes by %.2f %% in a tick, %.2f %% at most; "
+            "%.2f mm across\n",
+            radius_m * 1e3f, held.mean_n, 100 * held.median_change, 100 * held.largest_change,
+            1e3 * across);
+        EXPECT_LT(held.median_change, 0.005f);
+        EXPECT_LT(across, 1e-3f);
+      }
+    }
+}
+
 }  // namespace
 }  // namespace trocar::step

@@ -215,6 +215,10 @@ TROCAR_EXPORT(fine_picture_bytes) std::size_t trocar_fine_picture_bytes() {
 TROCAR_EXPORT(blood) const void* trocar_blood() {
   return model().blood();
 }
+// Bits of tools, by their slots.
+TROCAR_EXPORT(waiting_blades) std::uint32_t trocar_waiting_blades() {
+  return model().waiting_blades();
+}
 TROCAR_EXPORT(tools) std::size_t trocar_tools() {
   return model().tools().size();
 }

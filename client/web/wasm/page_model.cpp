@@ -41,6 +41,7 @@ void PageModel::restart() {
   error_.clear();
   tools_.clear();
   blood_.reset();
+  waiting_blades_ = 0;
   held_.clear();
   lines_ = {};
   drawing_.clear();
@@ -136,7 +137,7 @@ void PageModel::build_surface(std::size_t triangle_budget) {
   }
 }
 
-void PageModel::update_blood() {
+void PageModel::update_figures() {
   shape::cover_with_blood(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres),
                           covers_);
   lips_.resize(smooth_.vertex_count());
@@ -144,6 +145,7 @@ void PageModel::update_blood() {
     lips_[i] = shape::lip_bytes(smooth_.lips()[i], covers_[i]);
   const auto* newest = replica_->newest();
   if (newest == nullptr || !newest->has_state) return;  // its figures come in a moment
+  waiting_blades_ = newest->figures.pace.rate.waiting_blades;
   blood_.reset();
   if (!newest->figures.blood) return;
   const wire::BloodFigures& figures = *newest->figures.blood;
@@ -250,7 +252,7 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
     build_surface(triangle_budget);
   if (shown_->positions().size() != smooth_.coarse_vertex_count()) return false;
   smooth_.update(shown_->positions());
-  update_blood();
+  update_figures();
   update_tools();
   pointers_.clear();
   for (const auto& pointer : replica_->pointers(to_ns(now_ms)))

@@ -96,6 +96,8 @@ class PageModel {
   std::span<const std::array<std::int8_t, 4>> lips() const { return lips_; }
   // Returns what the newest frame says of blood; null: the session does not bleed.
   const PageBlood* blood() const { return blood_ ? &*blood_ : nullptr; }
+  // Returns wire::RateFigures::waiting_blades of the newest frame.
+  std::uint32_t waiting_blades() const { return waiting_blades_; }
   std::span<const PageTool> tools() const { return tools_; }
   std::span<const PagePointer> pointers() const { return pointers_; }
 
@@ -121,7 +123,7 @@ class PageModel {
  private:
   bool accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes);
   void build_surface(std::size_t triangle_budget);
-  void update_blood();
+  void update_figures();
   void update_tools();
   void update_overlay(Overlay overlay);
   void update_fine();
@@ -142,6 +144,7 @@ class PageModel {
   std::vector<float> covers_;  // by blood, 0 to 1
   std::vector<std::array<std::int8_t, 4>> lips_;
   std::optional<PageBlood> blood_;
+  std::uint32_t waiting_blades_ = 0;
   std::vector<PageTool> tools_;
   std::vector<PagePointer> pointers_;
   replica::DrawnLines lines_;

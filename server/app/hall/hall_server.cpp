@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <map>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "common/base/json.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "common/secure/digest.h"
 #include "server/session/access/audit_log.h"
@@ -302,8 +302,9 @@ std::uint16_t HallServer::port() const {
 
 void HallServer::answer(const hall::BusRequest& request, hall::Proof proof,
                         std::function<void(const std::string&)> answer) {
-  asio::co_spawn(core_->acceptor.context(), core_->answer_bus(request, proof, std::move(answer)),
-                 [core = core_](std::exception_ptr failure) { rethrow(failure); });
+  spawn(core_->acceptor.context().get_executor(),
+        core_->answer_bus(request, proof, std::move(answer)),
+        [core = core_](std::exception_ptr failure) { rethrow(failure); });
 }
 
 std::string HallServer::directory(const std::string& hall_name, const std::string& start) const {

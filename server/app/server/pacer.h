@@ -1,8 +1,10 @@
 #pragma once
 
-// When ticks are due. At most two run back to back to catch up; what is further behind is given up:
-// simulated time then runs slower than real time, counted, never a burst. Pure arithmetic on the
-// clock it is given, so that tests use a clock of their own.
+// When ticks are due. A tick that cuts may take as long as five, and those after it have room: what
+// is behind is caught up with, back to back. More than a frame is given up: simulated time then
+// runs slower than real time, counted. So nobody sees a burst, and a tick has the newest inputs
+// however late it is. Pure arithmetic on the clock it is given, so that tests use a clock of their
+// own.
 
 #include <cstdint>
 
@@ -26,9 +28,9 @@ class Pacer {
   // The next tick begins at `now_ns` >= due_ns().
   void begin_tick(std::uint64_t now_ns) {
     const std::uint64_t due_count = (now_ns - due_ns_) / period_ns_ + 1;
-    if (due_count > kBackToBack) {
-      if (period_ns_ >= kTickNanoseconds) slow_ticks_ += due_count - kBackToBack;
-      due_ns_ += (due_count - kBackToBack) * period_ns_;
+    if (due_count > kMostBehind) {
+      if (period_ns_ >= kTickNanoseconds) slow_ticks_ += due_count - kMostBehind;
+      due_ns_ += (due_count - kMostBehind) * period_ns_;
     }
     due_ns_ += period_ns_;
   }
@@ -38,7 +40,7 @@ class Pacer {
   std::uint64_t slow_ticks() const { return slow_ticks_; }
 
  private:
-  static constexpr std::uint64_t kBackToBack = 2;
+  static constexpr std::uint64_t kMostBehind = kTicksPerFrame;
 
   std::uint64_t due_ns_, period_ns_ = kTickNanoseconds;
   std::uint64_t slow_ticks_ = 0;

@@ -66,6 +66,7 @@ void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
     if (has_contact) sweeps[layer] += sweeps_now[layer];
   }
   contact_ticks += has_contact;
+  for (std::size_t i = 0; i < kMaxTools; ++i) waits[i] += decisions.waiting_blades >> i & 1;
 }
 
 void SolverReport::add(const wire::SolverFigures& figures) {
@@ -148,11 +149,17 @@ float SimulationLoop::rate() const {
 bool SimulationLoop::run_tick() {
   inbox_.drain(inputs_);
   if (chooser_.is_in_use()) control::read_forces(simulation_, forces_n_);
-  const auto decisions =
+  auto decisions =
       chooser_.choose(controller_ ? controller_->decisions() : options_.decisions, forces_n_);
+  decisions.waiting_blades = blade_waits_.waiting();
   const auto begin = options_.clock_ns();
   const auto& report = simulation_.tick(inputs_, decisions);
-  if (controller_) controller_->observe(report, {options_.clock_ns() - begin, lateness_ns_});
+  if (controller_) {
+    const auto work_ns = options_.clock_ns() - begin;
+    controller_->observe(report, {work_ns, lateness_ns_});
+    blade_waits_.observe(control::read_cutting_speeds(simulation_),
+                         static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds));
+  }
   const auto level = controller_ ? controller_->figures().level : wire::RateLevel::Fixed;
   report_.rate.add(decisions, report.contact.nodes > 0, level);
   report_.rate.late_ticks += lateness_ns_ > kTickNanoseconds;
@@ -199,6 +206,7 @@ void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
   pace.slow_ticks = slow_ticks_;
   if (controller_) pace.rate = controller_->figures();
   pace.rate.time_rate = time_rate_;
+  pace.rate.waiting_blades = blade_waits_.waited_lately();
   report_.slow_ticks = slow_ticks_;
   report_.last_frame = frame;
   if (journal_) journal_->record_frame(report_.last_frame);

@@ -23,6 +23,7 @@
 #include "server/app/server/journal_sink.h"
 #include "server/app/server/pacer.h"
 #include "server/session/bleeding/bleeding.h"
+#include "server/session/control/blade_waits.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
 #include "server/session/participants/inbox.h"
@@ -48,7 +49,8 @@ struct RateReport {
   Tick contact_ticks = 0;
   step::LayerCounts least_sweeps{};
   std::uint32_t least_node_limit = 0;
-  std::uint64_t late_ticks = 0;  // began more than a tick after they were due
+  std::uint64_t late_ticks = 0;         // began more than a tick after they were due
+  std::array<Tick, kMaxTools> waits{};  // ticks in which a tool's blade waited
 
   void add(const step::TickDecisions& decisions, bool has_contact, wire::RateLevel level);
 };
@@ -135,6 +137,7 @@ class SimulationLoop {
   // Simulation thread.
   std::optional<control::RateController> controller_;
   control::DepthChooser chooser_;        // of a calibrated organ, unless decisions are fixed
+  control::BladeWaits blade_waits_;      // unless decisions are fixed
   std::vector<double> forces_n_;         // of the tools that touched in the last tick
   std::uint64_t lateness_ns_ = 0;        // of the tick about to run
   std::uint64_t slow_ticks_before_ = 0;  // until the last full second

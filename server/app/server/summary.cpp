@@ -106,8 +106,12 @@ Json rate_figures(const Summary& s) {
   Json ticks = Json::object();
   for (std::size_t i = 0; i < rate.ticks_at.size(); ++i)
     ticks[wire::name_of(static_cast<wire::RateLevel>(i))] = rate.ticks_at[i];
+  Json waits = Json::object();
+  for (std::size_t i = 0; i < kMaxTools; ++i)
+    if (rate.waits[i] > 0) waits["tool-" + std::to_string(i)] = rate.waits[i];
   return {{"ticks", ticks},
           {"late_ticks", rate.late_ticks},
+          {"blade_wait_ticks", waits},
           {"lowered", last.lowered},
           {"raised", last.raised},
           {"budget_us", last.budget_us},

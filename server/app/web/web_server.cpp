@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/http.hpp>
@@ -10,6 +9,7 @@
 #include <set>
 
 #include "common/base/log.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "common/secure/digest.h"
 #include "server/app/web/recording_checks.h"
@@ -185,13 +185,13 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       rethrow(failure);
     };
     if (tls)
-      asio::co_spawn(context,
-                     serve_tls(beast::ssl_stream<beast::tcp_stream>(
-                                   beast::tcp_stream(std::move(socket)), *tls),
-                               peer, id),
-                     ended);
+      spawn(context.get_executor(),
+            serve_tls(
+                beast::ssl_stream<beast::tcp_stream>(beast::tcp_stream(std::move(socket)), *tls),
+                peer, id),
+            ended);
     else
-      asio::co_spawn(context, serve(beast::tcp_stream(std::move(socket)), peer, id), ended);
+      spawn(context.get_executor(), serve(beast::tcp_stream(std::move(socket)), peer, id), ended);
   }
 
   asio::awaitable<void> serve_tls(beast::ssl_stream<beast::tcp_stream> stream, std::string peer,
@@ -499,8 +499,8 @@ std::uint16_t WebServer::metrics_port() const {
 
 void WebServer::start() {
   const auto core = core_;
-  asio::co_spawn(core->context, core->accept(),
-                 [core](std::exception_ptr failure) { rethrow(failure); });
+  spawn(core->context.get_executor(), core->accept(),
+        [core](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void WebServer::stop() {

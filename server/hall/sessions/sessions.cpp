@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <chrono>
@@ -16,6 +15,7 @@
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "common/secure/link_file.h"
 #include "common/secure/private_files.h"
@@ -353,7 +353,7 @@ void Sessions::look_at(const std::shared_ptr<Session>& session) {
   if (session->is_probed || now_s() < session->probe_at_s) return;
   session->is_probed = true;
   session->probe_at_s = now_s() + kProbePeriod_s;
-  asio::co_spawn(context_, probe(session), rethrow);
+  spawn(context_.get_executor(), probe(session), rethrow);
 }
 
 void Sessions::on_ending(Session& session, const ServerProcess::Ending& ending) {

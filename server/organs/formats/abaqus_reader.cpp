@@ -21,8 +21,8 @@ constexpr int kMaxRanges = 10'000;  // each may name all elements
 
 // Elements beside tets, by how their types begin, with the number of nodes.
 constexpr std::pair<std::string_view, std::size_t> kFlatTypes[] = {
-    {"S3", 3},   {"STRI3", 3},  {"M3D3", 3}, {"CPS3", 3},
-    {"CPE3", 3}, {"SFM3D3", 3}, {"T3D2", 2}, {"B31", 2}};
+    {"S3", 3},   {"R3D3", 3},   {"STRI3", 3}, {"M3D3", 3}, {"CPS3", 3},
+    {"CPE3", 3}, {"SFM3D3", 3}, {"T3D2", 2},  {"B31", 2}};
 // Keywords that make what is not listed, and such that say nothing of the mesh.
 constexpr std::string_view kMakers[] = {"NGEN",  "NFILL",  "NCOPY", "NMAP",
                                         "ELGEN", "ELCOPY", "SYSTEM"};

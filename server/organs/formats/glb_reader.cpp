@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/json.h"
+#include "server/organs/formats/glb_numbers.h"
 #include "server/organs/formats/text_reader.h"
 #include "server/organs/formats/weld.h"
 
@@ -21,7 +22,6 @@ constexpr std::size_t kMostNodes = 10'000, kMostPrimitives = 100'000;  // the la
 constexpr std::size_t kBytesPerValue = 200, kBytesPerTriangle = 200;
 constexpr std::size_t kMostGrowth = 16, kSmallBytes = 16 * 1024 * 1024;
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
-constexpr int kUInt8 = 5121, kUInt16 = 5123, kUInt32 = 5125, kFloat = 5126;
 constexpr int kTriangles = 4;
 
 // An object of this kind finds its keys by their order: one that keeps them as they come compares

@@ -117,16 +117,17 @@ class Version2 {
   }
 
   Status element(std::int64_t type, std::int64_t tags, int node_count) {
-    std::int64_t id = 0, physical = 0, nodes[4] = {};
+    std::int64_t id = 0, physical = 0, entity = 0, nodes[4] = {};
     if (auto s = numbers_.whole32("the number of an element", id); !s) return s;
     for (std::int64_t i = 0; i < tags; ++i) {
       std::int64_t tag = 0;
       if (auto s = numbers_.whole32("a tag", tag); !s) return s;
       if (i == 0) physical = tag;
+      if (i == 1) entity = tag;
     }
     for (int i = 0; i < node_count; ++i)
       if (auto s = numbers_.whole32("a node of an element", nodes[i]); !s) return s;
-    return mesh_.add_element(id, type, {&physical, 1},
+    return mesh_.add_element(id, type, entity, {&physical, 1},
                              {nodes, static_cast<std::size_t>(node_count)});
   }
 
@@ -286,7 +287,8 @@ class Version4 {
       if (auto s = numbers_.whole64("the number of an element", id); !s) return s;
       for (int i = 0; i < *node_count; ++i)
         if (auto s = numbers_.whole64("a node of an element", nodes[i]); !s) return s;
-      return mesh_.add_element(id, type, physical, {nodes, static_cast<std::size_t>(*node_count)});
+      return mesh_.add_element(id, type, tag, physical,
+                               {nodes, static_cast<std::size_t>(*node_count)});
     });
     found += count;
     return status;

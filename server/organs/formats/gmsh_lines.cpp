@@ -91,15 +91,15 @@ class LineReader {
 
   Status element() {
     const auto id_text = in_.word();
-    std::int64_t id = 0, type = 0, physical = 0;
+    std::int64_t id = 0, type = 0, physical = 0, entity = 0;
     if (!parse_whole(id_text, id) || id < 1)
       return in_.error("element number " + shown(id_text) + " must be a whole number from 1 on");
     const std::string name = "element " + std::to_string(id);
     if (!parse_whole(in_.word(), type)) return in_.error(name + ": its type is not a whole number");
     const auto node_count = mesh_.node_count_of(name, type);
     if (!node_count) return node_count.error();
-    if (auto s =
-            version_ == 1 ? numbers_of_version1(name, *node_count, physical) : tags(name, physical);
+    if (auto s = version_ == 1 ? numbers_of_version1(name, *node_count, physical, entity)
+                               : tags(name, physical, entity);
         !s)
       return s;
     std::int64_t nodes[4] = {};
@@ -111,11 +111,11 @@ class LineReader {
     }
     if (!in_.word().empty())
       return in_.error(name + ": more than " + std::to_string(*node_count) + " nodes");
-    return mesh_.add_element(id, type, {&physical, 1},
+    return mesh_.add_element(id, type, entity, {&physical, 1},
                              {nodes, static_cast<std::size_t>(*node_count)});
   }
 
-  Status tags(const std::string& name, std::int64_t& physical) {
+  Status tags(const std::string& name, std::int64_t& physical, std::int64_t& entity) {
     std::int64_t count = 0;
     if (!parse_whole(in_.word(), count) || count < 0 || count > kMaxGmshTags)
       return in_.error(name + ": its number of tags must be from 0 to 1000");
@@ -124,13 +124,15 @@ class LineReader {
       if (!parse_whole(in_.word(), tag))
         return in_.error(name + ": a tag is missing or not a whole number");
       if (i == 0) physical = tag;
+      if (i == 1) entity = tag;
     }
     return {};
   }
 
-  Status numbers_of_version1(const std::string& name, int node_count, std::int64_t& physical) {
-    std::int64_t elementary = 0, count = 0;
-    if (!parse_whole(in_.word(), physical) || !parse_whole(in_.word(), elementary) ||
+  Status numbers_of_version1(const std::string& name, int node_count, std::int64_t& physical,
+                             std::int64_t& entity) {
+    std::int64_t count = 0;
+    if (!parse_whole(in_.word(), physical) || !parse_whole(in_.word(), entity) ||
         !parse_whole(in_.word(), count))
       return in_.error(name + ": a number of its region or of its nodes is missing");
     if (count != node_count)

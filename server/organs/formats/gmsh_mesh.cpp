@@ -1,6 +1,7 @@
 #include "server/organs/formats/gmsh_mesh.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace trocar::formats {
@@ -76,7 +77,7 @@ std::string GmshMesh::element_name(std::int64_t id, std::int64_t type) const {
   return type == 4 ? "tet " + std::to_string(raw_.tets.size() + 1) + " (" + name + ")" : name;
 }
 
-Status GmshMesh::add_element(std::int64_t id, std::int64_t type,
+Status GmshMesh::add_element(std::int64_t id, std::int64_t type, std::int64_t entity,
                              std::span<const std::int64_t> physical,
                              std::span<const std::int64_t> nodes) {
   const GmshKind* kind = find_gmsh_kind(type);
@@ -109,6 +110,7 @@ Status GmshMesh::add_element(std::int64_t id, std::int64_t type,
   if (type == 4) {
     raw_.tets.push_back(tet);
     raw_.element_ids.push_back(id);
+    if (groups == 0) ungrouped_.insert(entity);
   } else if (groups == 0) {
     ++skipped_;
   }
@@ -127,6 +129,46 @@ Status GmshMesh::add_physical_name(std::int64_t dimension, std::int64_t number,
   return {};
 }
 
+void GmshMesh::join_repeated() {
+  if (volumes_.size() < 2) return;
+  std::vector<std::int64_t> group_of(raw_.tets.size(), 0);
+  for (const auto& [number, tets] : volumes_)
+    for (const auto t : tets) group_of[t] = number;
+  std::vector<std::pair<mesh::Tet, std::size_t>> sorted;
+  for (const auto& tet : raw_.tets) {
+    auto corners = tet;
+    std::ranges::sort(corners);
+    sorted.emplace_back(corners, sorted.size());
+  }
+  std::ranges::sort(sorted);
+  std::vector<std::size_t> place(raw_.tets.size());
+  std::iota(place.begin(), place.end(), std::size_t{0});
+  for (std::size_t i = 1, first = 0; i < sorted.size(); ++i) {
+    if (sorted[i].first != sorted[first].first) first = i;
+    const auto one = sorted[first].second, other = sorted[i].second;
+    if (group_of[one] != 0 && group_of[other] != 0 && group_of[one] != group_of[other])
+      place[other] = one;
+  }
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < place.size(); ++t) {
+    if (place[t] != t) {  // it comes after the one that it is
+      place[t] = place[place[t]];
+      continue;
+    }
+    raw_.tets[kept] = raw_.tets[t];
+    raw_.element_ids[kept] = raw_.element_ids[t];
+    place[t] = kept++;
+  }
+  if (kept == place.size()) return;
+  raw_.tets.resize(kept);
+  raw_.element_ids.resize(kept);
+  for (auto& [number, tets] : volumes_) {
+    for (auto& t : tets) t = place[t];
+    std::ranges::sort(tets);
+    tets.erase(std::unique(tets.begin(), tets.end()), tets.end());
+  }
+}
+
 Result<mesh::RawTets> GmshMesh::finish() {
   if (!has_nodes_) return in_.error("the file ends without a $Nodes section");
   if (!has_elements_) return in_.error("the file ends without an $Elements section");
@@ -134,11 +176,15 @@ Result<mesh::RawTets> GmshMesh::finish() {
     const auto named = names_.find({dimension, number});
     return named != names_.end() ? named->second : begin + std::to_string(number);
   };
+  join_repeated();
   mesh::RegionSets regions(raw_.tets.size());
   for (const auto& [number, tets] : volumes_) regions.add(name_of(3, number, "region "), tets);
   std::move(regions).finish(raw_);
   for (auto& [key, nodes] : groups_)
     raw_.node_sets.push_back({name_of(key.first, key.second, ""), std::move(nodes)});
+  if (volumes_.empty() && ungrouped_.size() > 1)
+    raw_.left_out.push_back("no regions: its " + std::to_string(ungrouped_.size()) +
+                            " volumes are in no physical group");
   if (skipped_ > 0)
     raw_.left_out.push_back("left out " + std::to_string(skipped_) +
                             " points, lines and triangles of no physical group");

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -31,9 +32,10 @@ class GmshMesh {
   Status begin_elements();
   // Nodes of an element of that type. Error: unknown or of no use here.
   Result<int> node_count_of(const std::string& element, std::int64_t type) const;
-  // physical: the numbers of its groups, 0 is none. Nodes by the file's numbers.
-  Status add_element(std::int64_t id, std::int64_t type, std::span<const std::int64_t> physical,
-                     std::span<const std::int64_t> nodes);
+  // entity: of the geometry, on which it lies. physical: the numbers of its groups, 0 is none.
+  // Nodes by the file's numbers.
+  Status add_element(std::int64_t id, std::int64_t type, std::int64_t entity,
+                     std::span<const std::int64_t> physical, std::span<const std::int64_t> nodes);
   // "tet 11 (element 705)", or "element 705" of another type; of the element that comes next.
   std::string element_name(std::int64_t id, std::int64_t type) const;
 
@@ -45,6 +47,9 @@ class GmshMesh {
   Result<mesh::RawTets> finish();
 
  private:
+  // Versions 1 and 2.2 list an element once for each of its groups: those become one element.
+  void join_repeated();
+
   TextReader& in_;
   bool has_nodes_ = false, has_elements_ = false;
   mesh::RawTets raw_;
@@ -52,6 +57,7 @@ class GmshMesh {
   std::map<std::pair<std::int64_t, std::int64_t>, std::string> names_;  // by dimension and number
   std::map<std::pair<std::int64_t, std::int64_t>, std::vector<NodeIndex>> groups_;
   std::map<std::int64_t, std::vector<std::size_t>> volumes_;  // tets of each group
+  std::set<std::int64_t> ungrouped_;   // volumes of which a tet is in no group
   std::size_t grown_ = 0;              // numbers in groups beyond the first one of each element
   std::size_t skipped_ = 0;            // points, lines and triangles of no group
   std::vector<std::string> left_out_;  // sections

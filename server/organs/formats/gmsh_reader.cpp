@@ -8,7 +8,7 @@ namespace trocar::formats {
 namespace {
 
 constexpr const char* kFormats =
-    "versions 1, 2.2 and 4.1 are read, convert with: gmsh IN -save -format msh41 -o OUT.msh";
+    "versions 1, 2 to 2.2 and 4.1 are read, convert with: gmsh IN -save -format msh41 -o OUT.msh";
 
 Status read_format(TextReader& in, GmshMesh& mesh) {
   if (!in.next_line()) return in.error("is empty");
@@ -17,12 +17,15 @@ Status read_format(TextReader& in, GmshMesh& mesh) {
     return in.error(std::string("does not begin with $MeshFormat: ") + kFormats);
   if (auto s = in.need_line("$MeshFormat"); !s) return s;
   const auto version = in.word(), type = in.word(), size = in.word();
-  if (version != "2.2" && version != "4.1")
+  double number = 0;
+  const bool is_number = parse_finite(version, number);  // Netgen writes 2.000000
+  const bool is_version4 = is_number && number == 4.1;
+  if (!is_version4 && !(is_number && number >= 2 && number <= 2.2))
     return in.error("is Gmsh version " + shown(version) + ": " + kFormats);
   if ((type != "0" && type != "1") || size != "8" || !in.word().empty())
     return in.error("format line must be '" + std::string(version) + " 0 8' or '" +
                     std::string(version) + " 1 8'");
-  const bool is_binary = type == "1", is_version4 = version == "4.1";
+  const bool is_binary = type == "1";
   if (is_binary) {
     const auto one = in.bytes(4);
     if (one != std::string_view("\1\0\0\0", 4))
@@ -53,6 +56,8 @@ Status need_gmsh_end(TextReader& in, std::string_view end, bool is_behind) {
 }
 
 Status skip_gmsh_section(TextReader& in, GmshMesh& mesh) {
+  if (in.line() == "$ParametricNodes")
+    return in.error("has $ParametricNodes: save the mesh without them (Mesh.SaveParametric)");
   if (in.line() != "$Comments") mesh.leave_out(in.line());
   const std::string name(in.line().substr(std::min<std::size_t>(1, in.line().size())));
   const auto begins =

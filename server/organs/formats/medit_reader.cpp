@@ -105,8 +105,7 @@ class MeditReader {
   Status elements(const std::string& keyword, int corners) {
     if (!has_vertices_) return in_.error(keyword + " come before Vertices");
     const bool is_tets = keyword == "Tetrahedra";
-    if (is_tets && std::exchange(has_tets_, true))
-      return in_.error("a second list of Tetrahedra: a file must have one");
+    has_tets_ = has_tets_ || is_tets;
     has_other_ = has_other_ || !is_tets;
     std::int64_t count = 0;
     if (auto s = begin(keyword, 2 * corners + 2, count); !s) return s;
@@ -119,7 +118,9 @@ class MeditReader {
           return s;
       if (auto s = in_.read_whole(who + ": the reference", reference); !s) return s;
       if (is_tets) {
-        if (auto s = tets_.add_tet(i, nodes, in_); !s) return s;
+        // Some programs write a list for each block of them.
+        const auto number = static_cast<std::int64_t>(tets_.raw.tets.size()) + 1;
+        if (auto s = tets_.add_tet(number, nodes, in_); !s) return s;
         tets_.raw.tet_regions.push_back(reference);
         continue;
       }

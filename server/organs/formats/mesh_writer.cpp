@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "common/base/json.h"
+#include "server/organs/formats/glb_numbers.h"
 
 namespace trocar::formats {
 namespace {
@@ -145,7 +146,7 @@ std::string to_glb(const WrittenMesh& written) {
 }
 
 std::string to_glb(const GlbSurface& surface) {
-  constexpr int kVertices = 34962, kIndices = 34963, kFloat = 5126, kUInt32 = 5125;
+  constexpr int kVertices = 34962, kIndices = 34963;
   std::string body;
   Json views = Json::array(), accessors = Json::array();
   const auto add_view = [&](const std::string& part, int target) {

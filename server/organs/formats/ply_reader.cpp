@@ -9,6 +9,7 @@
 
 #include "server/organs/formats/polygon.h"
 #include "server/organs/formats/text_reader.h"
+#include "server/organs/mesh/raw_tets.h"
 
 namespace trocar::formats {
 namespace {
@@ -195,12 +196,26 @@ class PlyReader {
       return in_.error("vertices need the properties x, y and z");
     if (element.name == "face" && !has("vertex_indices") && !has("vertex_index"))
       return in_.error("faces need the list vertex_indices");
+    leave_out_properties(element);
     if (element.name != "vertex" && element.name != "face" && element.count > 0)
       surface_.left_out.push_back("left out " + std::to_string(element.count) + " elements " +
                                   shown(element.name));
     for (std::int64_t i = 1; i <= element.count; ++i)
       if (auto s = read_one(element, i); !s) return s;
     return {};
+  }
+
+  // Normals follow from the faces.
+  void leave_out_properties(const Element& element) {
+    static constexpr std::string_view kTaken[] = {
+        "x", "y", "z", "nx", "ny", "nz", "vertex_indices", "vertex_index"};
+    if (element.name != "vertex" && element.name != "face") return;
+    std::vector<std::string> names;
+    for (const Property& p : element.properties)
+      if (std::ranges::find(kTaken, p.name) == std::end(kTaken))
+        names.push_back(plain_name(p.name));
+    if (element.count > 0 && !names.empty())
+      surface_.left_out.push_back("left out of each " + element.name + ": " + mesh::list_of(names));
   }
 
   Status read_one(const Element& element, std::int64_t number_of_it) {

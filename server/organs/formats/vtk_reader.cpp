@@ -15,17 +15,43 @@
 namespace trocar::formats {
 namespace {
 
-// Bytes of a number of that name; 0: unknown, or of no fixed size. VTK writes vtkIdType as an int,
-// whatever its own has.
+struct VtkType {
+  std::string_view name;
+  std::int64_t bytes;
+  bool is_unsigned = false;
+};
+// VTK writes vtkIdType as an int, whatever its own has. Other programs also write the names that it
+// has for whole numbers of a fixed size.
+constexpr VtkType kVtkTypes[] = {{"char", 1},
+                                 {"signed_char", 1},
+                                 {"unsigned_char", 1, true},
+                                 {"short", 2},
+                                 {"int", 4},
+                                 {"unsigned_short", 2, true},
+                                 {"float", 4},
+                                 {"double", 8},
+                                 {"unsigned_int", 4, true},
+                                 {"long", 8},
+                                 {"vtkIdType", 4},
+                                 {"unsigned_long", 8, true},
+                                 {"vtktypeint8", 1},
+                                 {"vtktypeint16", 2},
+                                 {"vtktypeuint8", 1, true},
+                                 {"vtktypeint32", 4},
+                                 {"vtktypeint64", 8},
+                                 {"vtktypeuint16", 2, true},
+                                 {"vtkidtype", 4},
+                                 {"vtktypeuint32", 4, true},
+                                 {"vtktypeuint64", 8, true}};
+
+// Bytes of a number of that name; 0: unknown, or of no fixed size.
 std::int64_t vtk_size_of(std::string_view type) {
-  static constexpr std::pair<std::string_view, std::int64_t> kSizes[] = {
-      {"char", 1},          {"unsigned_char", 1}, {"short", 2},        {"unsigned_short", 2},
-      {"int", 4},           {"float", 4},         {"unsigned_int", 4}, {"long", 8},
-      {"unsigned_long", 8}, {"double", 8},        {"vtkIdType", 4},    {"vtktypeint64", 8},
-      {"vtktypeint32", 4}};
-  const auto at =
-      std::ranges::find(kSizes, type, &std::pair<std::string_view, std::int64_t>::first);
-  return at == std::end(kSizes) ? 0 : at->second;
+  const auto at = std::ranges::find(kVtkTypes, type, &VtkType::name);
+  return at == std::end(kVtkTypes) ? 0 : at->bytes;
+}
+bool is_unsigned(std::string_view type) {
+  const auto at = std::ranges::find(kVtkTypes, type, &VtkType::name);
+  return at != std::end(kVtkTypes) && at->is_unsigned;
 }
 
 template <typename T>
@@ -119,16 +145,16 @@ class VtkReader {
   }
 
   static std::int64_t whole(const std::string& type, std::string_view bytes) {
-    if (type == "char") return static_cast<signed char>(bytes[0]);
     switch (bytes.size()) {
       case 1:
-        return static_cast<unsigned char>(bytes[0]);
+        return is_unsigned(type) ? std::int64_t{static_cast<unsigned char>(bytes[0])}
+                                 : static_cast<signed char>(bytes[0]);
       case 2:
-        return type == "short" ? big_endian<std::int16_t>(bytes)
-                               : std::int64_t{big_endian<std::uint16_t>(bytes)};
+        return is_unsigned(type) ? std::int64_t{big_endian<std::uint16_t>(bytes)}
+                                 : big_endian<std::int16_t>(bytes);
       case 4:
-        return type == "unsigned_int" ? std::int64_t{big_endian<std::uint32_t>(bytes)}
-                                      : big_endian<std::int32_t>(bytes);
+        return is_unsigned(type) ? std::int64_t{big_endian<std::uint32_t>(bytes)}
+                                 : big_endian<std::int32_t>(bytes);
       default:
         return big_endian<std::int64_t>(bytes);
     }
@@ -288,10 +314,20 @@ class VtkReader {
     return {};
   }
 
-  // SCALARS name type [components] and its table, VECTORS and NORMALS name type, and so on.
+  // SCALARS name type [components] and its table, VECTORS and NORMALS name type, and so on. Colours
+  // have a number in the place of a type, which tells how many each has, or how many there are.
   Status attribute(const std::string& keyword) {
-    const std::string name(in_.word()), type(in_.word());
-    std::int64_t components = 1;
+    const std::string name(in_.word());
+    std::int64_t components = 1, tuples = data_count_;
+    if (keyword == "COLOR_SCALARS" || keyword == "LOOKUP_TABLE" ||
+        keyword == "TEXTURE_COORDINATES") {
+      std::int64_t& number = keyword == "LOOKUP_TABLE" ? tuples : components;
+      if (const auto text = in_.word(); !parse_whole(text, number) || number < 0)
+        return in_.error(keyword + " needs a number, found " + shown(text));
+    }
+    const std::string type(keyword == "COLOR_SCALARS" || keyword == "LOOKUP_TABLE"
+                               ? (is_binary_ ? "unsigned_char" : "float")
+                               : in_.word());
     if (keyword == "SCALARS") {
       if (const auto text = in_.word(); !text.empty() && !parse_whole(text, components))
         return in_.error("number of components is " + shown(text));
@@ -302,13 +338,18 @@ class VtkReader {
       }
     } else if (keyword == "VECTORS" || keyword == "NORMALS") {
       components = 3;
+    } else if (keyword == "TENSORS6") {
+      components = 6;
     } else if (keyword == "TENSORS") {
       components = 9;
-    } else {
+    } else if (keyword == "LOOKUP_TABLE") {
+      components = 4;
+    } else if (keyword != "COLOR_SCALARS" && keyword != "TEXTURE_COORDINATES" &&
+               keyword != "GLOBAL_IDS" && keyword != "PEDIGREE_IDS" && keyword != "EDGE_FLAGS") {
       return in_.error("data of kind " + shown(keyword) + " cannot be read: save without them");
     }
     if (components < 1 || components > 9) return in_.error("number of components must be 1 to 9");
-    return values(name, type, components, data_count_);
+    return values(name, type, components, tuples);
   }
 
   Status field() {
@@ -335,35 +376,52 @@ class VtkReader {
   // Reads over data, or keeps them as regions.
   Status values(const std::string& name, const std::string& type, std::int64_t components,
                 std::int64_t tuples) {
-    if (vtk_size_of(type) == 0)
+    const std::int64_t size = vtk_size_of(type);
+    if (size == 0 && type != "bit" && type != "string")
       return in_.error("data " + shown(name) + " of type " + shown(type) +
                        " cannot be read: save without them");
     if (components > 0 && tuples > std::int64_t{1} << 40)
       return in_.error("array " + shown(name) + " announces too many tuples");
-    if (auto s =
-            in_.check_count(components * tuples, is_binary_ ? vtk_size_of(type) : 2, "numbers");
-        !s)
-      return s;
     const std::int64_t count = components * tuples;
+    const bool is_bits = is_binary_ && type == "bit";
+    const std::int64_t least = type == "string" || is_bits ? 1 : least_bytes(type);
+    auto s = in_.check_count(is_bits ? (count + 7) / 8 : count, least, "numbers");
+    if (!s) return s;
     const std::string data = (data_count_ < 0 ? "field data "
                               : is_cell_data_ ? "cell data "
                                               : "point data ") +
                              shown(name);
-    if (is_cell_data_ && data_count_ >= 0 && components == 1 && !is_surface_ &&
+    if (is_cell_data_ && data_count_ >= 0 && components == 1 && !is_surface_ && size > 0 &&
         is_region_name(name) && tuples == static_cast<std::int64_t>(cells_.ends.size()) &&
         cells_.regions.empty())
       return regions(data, type, count);
     cells_.left_out.push_back(data);
-    if (is_binary_) {
-      const auto bytes = static_cast<std::size_t>(count * vtk_size_of(type));
-      if (bytes > 0 && in_.bytes(bytes).empty())
-        return in_.error("the file ends inside " + shown(name) + ": it is cut off");
-      return {};
-    }
-    for (std::int64_t i = 0; i < count; ++i)
-      if (in_.token().empty())
-        return in_.error("the file ends inside " + shown(name) + ": it is cut off");
+    bool is_there = true;
+    if (type == "string")
+      for (std::int64_t i = 0; is_there && i < count; ++i) is_there = skip_string();
+    else if (is_binary_)
+      is_there =
+          count == 0 ||
+          !in_.bytes(static_cast<std::size_t>(is_bits ? (count + 7) / 8 : count * size)).empty();
+    else
+      for (std::int64_t i = 0; is_there && i < count; ++i) is_there = !in_.token().empty();
+    if (!is_there) return in_.error("the file ends inside " + shown(name) + ": it is cut off");
     return {};
+  }
+
+  // A line as text. In binary files a length goes before, whose two highest bits tell how many
+  // bytes it has itself: 8, 4, 2 or 1. False: the file ends.
+  bool skip_string() {
+    if (!is_binary_) return in_.next_line();
+    const auto first = in_.bytes(1);
+    if (first.empty()) return false;
+    const unsigned head = static_cast<unsigned char>(first[0]);
+    const std::size_t more = (8u >> (head >> 6)) - 1;
+    const auto rest = in_.bytes(more);
+    if (rest.size() != more) return false;
+    std::uint64_t length = head & 63;
+    for (const char c : rest) length = length << 8 | static_cast<unsigned char>(c);
+    return length == 0 || !in_.bytes(length).empty();
   }
 
   Status regions(const std::string& data, const std::string& type, std::int64_t count) {

@@ -1,8 +1,9 @@
 #include "server/organs/formats/vtu_array.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "common/base/inflate.h"
@@ -44,16 +45,25 @@ Result<std::string> decode_base64(std::string_view text, std::size_t wanted) {
   return out;
 }
 
+// The number that begins at `bytes`.
+template <typename T>
+T number_at(const char* bytes, bool is_big_endian) {
+  std::array<char, sizeof(T)> own{};
+  std::copy_n(bytes, sizeof(T), own.begin());
+  if (is_big_endian) std::ranges::reverse(own);
+  return std::bit_cast<T>(own);
+}
+
 // Takes lengths from the front of decoded bytes.
 struct Header {
   std::string_view bytes;
-  bool is_wide;
+  const VtuSource& source;
 
   bool take(std::uint64_t& value) {
-    const std::size_t size = is_wide ? 8 : 4;
+    const std::size_t size = source.has_wide_header ? 8 : 4;
     if (bytes.size() < size) return false;
-    value = 0;
-    std::memcpy(&value, bytes.data(), size);
+    value = source.has_wide_header ? number_at<std::uint64_t>(bytes.data(), source.is_big_endian)
+                                   : number_at<std::uint32_t>(bytes.data(), source.is_big_endian);
     bytes.remove_prefix(size);
     return true;
   }
@@ -61,7 +71,7 @@ struct Header {
 
 // The bytes of the numbers, from decoded ones that begin with their lengths.
 Result<std::string> unframe(const VtuSource& source, std::string_view framed) {
-  Header header{framed, source.has_wide_header};
+  Header header{framed, source};
   std::uint64_t length = 0;
   if (!source.is_packed) {
     if (!header.take(length)) return bad("data end before their length");
@@ -109,7 +119,7 @@ Result<std::string> bytes_of(const VtuSource& source) {
   const std::size_t width = source.has_wide_header ? 8 : 4;
   auto head = decode_base64(tail, width);
   if (!head) return head.error();
-  Header header{*head, source.has_wide_header};
+  Header header{*head, source};
   std::uint64_t first = 0;
   if (!header.take(first)) return bad("data end before their length");
   std::uint64_t wanted = width + first;
@@ -118,7 +128,7 @@ Result<std::string> bytes_of(const VtuSource& source) {
     const auto header_bytes = width * (3 + first);
     auto sizes = decode_base64(tail, header_bytes);
     if (!sizes) return sizes.error();
-    Header list{*sizes, source.has_wide_header};
+    Header list{*sizes, source};
     std::uint64_t size = 0;
     wanted = header_bytes;
     for (std::uint64_t i = 0; i < 3 + first; ++i) {
@@ -132,26 +142,25 @@ Result<std::string> bytes_of(const VtuSource& source) {
 }
 
 template <typename Stored, typename Value>
-Result<std::vector<Value>> convert(const std::string& bytes) {
+Result<std::vector<Value>> convert(const VtuSource& source, const std::string& bytes) {
   if (bytes.size() % sizeof(Stored) != 0) return bad("data end inside a number");
   std::vector<Value> values(bytes.size() / sizeof(Stored));
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    Stored stored{};
-    std::memcpy(&stored, bytes.data() + i * sizeof stored, sizeof stored);
-    values[i] = static_cast<Value>(stored);
-  }
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<Value>(
+        number_at<Stored>(bytes.data() + i * sizeof(Stored), source.is_big_endian));
   return values;
 }
 
 template <typename Value>
-Result<std::vector<Value>> convert_wholes(std::string_view type, const std::string& bytes) {
-  if (type == "Int8") return convert<std::int8_t, Value>(bytes);
-  if (type == "UInt8") return convert<std::uint8_t, Value>(bytes);
-  if (type == "Int16") return convert<std::int16_t, Value>(bytes);
-  if (type == "UInt16") return convert<std::uint16_t, Value>(bytes);
-  if (type == "Int32") return convert<std::int32_t, Value>(bytes);
-  if (type == "UInt32") return convert<std::uint32_t, Value>(bytes);
-  if (type == "Int64" || type == "UInt64") return convert<std::int64_t, Value>(bytes);
+Result<std::vector<Value>> convert_wholes(const VtuSource& source, const std::string& bytes) {
+  const auto type = source.type;
+  if (type == "Int8") return convert<std::int8_t, Value>(source, bytes);
+  if (type == "UInt8") return convert<std::uint8_t, Value>(source, bytes);
+  if (type == "Int16") return convert<std::int16_t, Value>(source, bytes);
+  if (type == "UInt16") return convert<std::uint16_t, Value>(source, bytes);
+  if (type == "Int32") return convert<std::int32_t, Value>(source, bytes);
+  if (type == "UInt32") return convert<std::uint32_t, Value>(source, bytes);
+  if (type == "Int64" || type == "UInt64") return convert<std::int64_t, Value>(source, bytes);
   return bad("numbers of type " + shown(type) + " are not of the kind that is needed here");
 }
 
@@ -174,9 +183,9 @@ Result<std::vector<double>> read_vtu_numbers(const VtuSource& source) {
   if (source.format == "ascii") return parse_words<double>(source.content, parse_finite);
   const auto bytes = bytes_of(source);
   if (!bytes) return bytes.error();
-  auto values = source.type == "Float64"   ? convert<double, double>(*bytes)
-                : source.type == "Float32" ? convert<float, double>(*bytes)
-                                           : convert_wholes<double>(source.type, *bytes);
+  auto values = source.type == "Float64"   ? convert<double, double>(source, *bytes)
+                : source.type == "Float32" ? convert<float, double>(source, *bytes)
+                                           : convert_wholes<double>(source, *bytes);
   if (values)
     for (std::size_t i = 0; i < values->size(); ++i)
       if (!std::isfinite((*values)[i]))
@@ -188,7 +197,7 @@ Result<std::vector<std::int64_t>> read_vtu_wholes(const VtuSource& source) {
   if (source.format == "ascii") return parse_words<std::int64_t>(source.content, parse_whole);
   const auto bytes = bytes_of(source);
   if (!bytes) return bytes.error();
-  return convert_wholes<std::int64_t>(source.type, *bytes);
+  return convert_wholes<std::int64_t>(source, *bytes);
 }
 
 }  // namespace trocar::formats

@@ -28,6 +28,7 @@ struct VtuSource {
   bool is_appended_raw = false;
   bool has_wide_header = false;  // lengths are of 64 bits, not 32
   bool is_packed = false;        // by zlib
+  bool is_big_endian = false;    // of numbers and lengths
   std::size_t file_bytes = 0;    // size of the whole file
 };
 

@@ -1,8 +1,9 @@
 #include "server/organs/label_map/nifti_reader.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "common/base/inflate.h"
 #include "server/organs/formats/mesh_file.h"
@@ -10,7 +11,7 @@
 namespace trocar::label_map {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 348;
+constexpr std::size_t kHeaderBytes = 348, kHeaderBytes2 = 540;  // of NIfTI-1 and NIfTI-2
 constexpr std::size_t kMaxBytes = std::size_t{512} << 20;
 constexpr int kMaxLabel = 65535;
 
@@ -37,6 +38,16 @@ Result<std::string> gunzip(std::string_view packed, const std::string& name) {
   return out;
 }
 
+// Holds what both kinds of headers say, in other places and widths.
+struct Header {
+  std::array<std::int64_t, 8> dim{};
+  std::array<double, 8> pixdim{};
+  std::int64_t datatype = 0, qform = 0, sform = 0, units = 0;
+  double vox_offset = 0, slope = 0, inter = 0;
+  std::array<double, 3> quatern{}, qoffset{};
+  std::array<double, 12> srow{};
+};
+
 class NiftiReader {
  public:
   NiftiReader(std::string_view bytes, std::optional<mesh::Unit> unit, const std::string& name)
@@ -55,51 +66,96 @@ class NiftiReader {
 
   template <typename T>
   T at(std::size_t offset) const {
-    T value{};
-    std::memcpy(&value, bytes_.data() + offset, sizeof value);
-    return value;
+    std::array<char, sizeof(T)> own{};
+    std::copy_n(bytes_.data() + offset, sizeof(T), own.begin());
+    if (is_big_endian_) std::ranges::reverse(own);
+    return std::bit_cast<T>(own);
   }
 
   Status check_header() {
     if (bytes_.size() < kHeaderBytes)
       return error("has " + std::to_string(bytes_.size()) + " bytes, a header has 348");
+    is_big_endian_ = bytes_[0] == 0;
     const auto size = at<std::int32_t>(0);
-    if (size == 540) return error("is NIfTI-2: save it as NIfTI-1");
-    if (size == 0x5c010000)
-      return error("is big-endian: save it in the byte order of this machine");
-    if (size != static_cast<std::int32_t>(kHeaderBytes))
-      return error("sizeof_hdr is " + std::to_string(size) + ", must be 348: it is no NIfTI file");
-    if (bytes_.substr(344, 4) == std::string_view("ni1\0", 4))
+    if (size != std::int32_t{kHeaderBytes} && size != std::int32_t{kHeaderBytes2})
+      return error("sizeof_hdr is " + std::to_string(size) +
+                   ", must be 348 or 540: it is no NIfTI file");
+    is_second_ = size == std::int32_t{kHeaderBytes2};
+    if (is_second_ && bytes_.size() < kHeaderBytes2)
+      return error("has " + std::to_string(bytes_.size()) + " bytes, a header has 540");
+    const auto magic = bytes_.substr(is_second_ ? 4 : 344, 4);
+    if (magic == std::string_view("ni1\0", 4) || magic == std::string_view("ni2\0", 4))
       return error("holds its image in another file: save both as one .nii");
-    if (bytes_.substr(344, 4) != std::string_view("n+1\0", 4))
-      return error("magic is not n+1: it is no NIfTI file");
+    if (magic != std::string_view(is_second_ ? "n+2\0" : "n+1\0", 4))
+      return error("magic is not n+1 or n+2: it is no NIfTI file");
+    if (is_second_)
+      read_second();
+    else
+      read_first();
     // A slope of 0 says that nothing is scaled, whatever scl_inter is.
-    const auto slope = at<float>(112), inter = at<float>(116);
-    if (slope != 0 && !(slope == 1 && inter == 0))
+    if (header_.slope != 0 && !(header_.slope == 1 && header_.inter == 0))
       return error("scl_slope and scl_inter scale the values: a label map has whole labels");
     return {};
   }
 
+  template <typename Stored, typename Values>
+  void take(std::size_t offset, Values& values) const {
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = at<Stored>(offset + i * sizeof(Stored));
+  }
+
+  void read_first() {
+    take<std::int16_t>(40, header_.dim);
+    header_.datatype = at<std::int16_t>(70);
+    take<float>(76, header_.pixdim);
+    header_.vox_offset = at<float>(108);
+    header_.slope = at<float>(112);
+    header_.inter = at<float>(116);
+    header_.units = at<std::uint8_t>(123);
+    header_.qform = at<std::int16_t>(252);
+    header_.sform = at<std::int16_t>(254);
+    take<float>(256, header_.quatern);
+    take<float>(268, header_.qoffset);
+    take<float>(280, header_.srow);
+  }
+
+  void read_second() {
+    header_.datatype = at<std::int16_t>(12);
+    take<std::int64_t>(16, header_.dim);
+    take<double>(104, header_.pixdim);
+    header_.vox_offset = static_cast<double>(at<std::int64_t>(168));
+    header_.slope = at<double>(176);
+    header_.inter = at<double>(184);
+    header_.qform = at<std::int32_t>(344);
+    header_.sform = at<std::int32_t>(348);
+    take<double>(352, header_.quatern);
+    take<double>(376, header_.qoffset);
+    take<double>(400, header_.srow);
+    header_.units = at<std::int32_t>(500);
+  }
+
   Status read_size() {
-    const auto dimensions = at<std::int16_t>(40);
+    constexpr std::int64_t kMost = 32767;  // in a direction, as NIfTI-1 has at most
+    const auto dimensions = header_.dim[0];
     if (dimensions < 3 || dimensions > 7)
       return error("dim[0] is " + std::to_string(dimensions) + ", must be 3");
     for (std::size_t d = 1; d <= static_cast<std::size_t>(dimensions); ++d) {
-      const auto count = at<std::int16_t>(40 + 2 * d);
-      if (count < 1 || (d > 3 && count != 1))
+      const auto count = header_.dim[d];
+      if (count < 1 || count > kMost || (d > 3 && count != 1))
         return error("dim[" + std::to_string(d) + "] is " + std::to_string(count) +
-                     (d > 3 ? ", a label map has one volume" : ", must be 1 or more"));
-      if (d <= 3) map_.size[d - 1] = count;
+                     (d > 3 ? ", a label map has one volume" : ", must be 1 to 32767"));
+      if (d <= 3) map_.size[d - 1] = static_cast<int>(count);
     }
-    const auto code = at<std::int16_t>(70);
+    const auto code = header_.datatype;
     const auto type = std::ranges::find(kStoredTypes, code, &StoredType::code);
     if (type == std::end(kStoredTypes))
       return error("datatype " + std::to_string(code) + " is not read: save it as one of " +
                    stored_types());
     type_ = *type;
-    const auto offset = at<float>(108);
-    if (!(offset >= 348 && offset <= 1e6f) || offset != std::floor(offset))
-      return error("vox_offset must be a whole number from 348 to 1,000,000");
+    const auto offset = header_.vox_offset;
+    const double least = is_second_ ? double{kHeaderBytes2} : double{kHeaderBytes};
+    if (!(offset >= least && offset <= 1e6) || offset != std::floor(offset))
+      return error("vox_offset must be a whole number from the header's end to 1,000,000");
     begin_ = static_cast<std::size_t>(offset);
     count_ =
         std::uint64_t(map_.size[0]) * std::uint64_t(map_.size[1]) * std::uint64_t(map_.size[2]);
@@ -113,7 +169,7 @@ class NiftiReader {
   }
 
   Status read_unit() {
-    const auto units = static_cast<unsigned char>(bytes_[123]) & 7;
+    const auto units = header_.units & 7;
     if (units == 0) {
       scale_ = mesh::metres_of(unit_.value_or(mesh::Unit::Millimetre));
       if (!unit_)
@@ -135,14 +191,13 @@ class NiftiReader {
   Status read_place() {
     std::array<Vec3d, 3> columns, of_qform;
     Vec3d origin;
-    const auto sform = at<std::int16_t>(254), qform = at<std::int16_t>(252);
-    const std::array<double, 3> sizes{at<float>(80), at<float>(84), at<float>(88)};
+    const auto sform = header_.sform, qform = header_.qform;
+    const std::array<double, 3> sizes{header_.pixdim[1], header_.pixdim[2], header_.pixdim[3]};
     const auto turned = qform > 0 ? rotation(sizes, of_qform) : Status{};
-    const Vec3d origin_of_qform{at<float>(268), at<float>(272), at<float>(276)};
+    const auto& offset = header_.qoffset;
+    const Vec3d origin_of_qform{offset[0], offset[1], offset[2]};
     if (sform > 0) {
-      const auto row = [&](std::size_t r, std::size_t c) {
-        return double{at<float>(280 + 16 * r + 4 * c)};
-      };
+      const auto row = [&](std::size_t r, std::size_t c) { return header_.srow[4 * r + c]; };
       for (std::size_t c = 0; c < 3; ++c) columns[c] = {row(0, c), row(1, c), row(2, c)};
       origin = {row(0, 3), row(1, 3), row(2, 3)};
     } else if (qform > 0) {
@@ -195,12 +250,12 @@ class NiftiReader {
   }
 
   Status rotation(const std::array<double, 3>& sizes, std::array<Vec3d, 3>& columns) const {
-    const double b = at<float>(256), c = at<float>(260), d = at<float>(264);
+    const auto [b, c, d] = header_.quatern;
     const double rest = 1 - (b * b + c * c + d * d);
     if (!(rest > -1e-5)) return error("the quaternion of its qform is longer than 1");
     const double a = std::sqrt(std::max(rest, 0.0));
     // pixdim[0] is the sign of the third axis; 0 counts as 1.
-    const double side = at<float>(76) < 0 ? -1 : 1;
+    const double side = header_.pixdim[0] < 0 ? -1 : 1;
     columns = {
         Vec3d{a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)} * sizes[0],
         Vec3d{2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)} * sizes[1],
@@ -252,6 +307,8 @@ class NiftiReader {
   }
 
   std::string_view bytes_;
+  bool is_big_endian_ = false, is_second_ = false;
+  Header header_;
   std::optional<mesh::Unit> unit_;
   const std::string& name_;
   StoredType type_{};

@@ -1,6 +1,6 @@
 #pragma once
 
-// Reader of label maps in NIfTI-1 files (.nii, .nii.gz), for files that nobody vouches for.
+// Reader of label maps in NIfTI files (.nii, .nii.gz), for files that nobody vouches for.
 //
 // One volume of whole numbers from 0 to 65535, unscaled, of at most kMaxLabels values beside 0. The
 // stored type is an integer of 8 to 32 bits, a signed one of 64, or a float. The place of its
@@ -9,7 +9,8 @@
 // and head (RAS). Errors are one line with the file's name and the header's field. Memory grows
 // with the bytes that are there, to 512 MiB at most.
 //
-// Source: Cox et al.: A (sort of) new image data format standard: NIfTI-1, 2004; nifti1.h.
+// Source: Cox et al.: A (sort of) new image data format standard: NIfTI-1, 2004; nifti1.h and
+// nifti2.h.
 
 #include <filesystem>
 #include <optional>

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <charconv>
 #include <cstring>
@@ -13,6 +12,7 @@
 #include "common/base/log.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "common/base/spawn.h"
 #include "server/session/monitoring/http_ask.h"
 
 namespace trocar::agones {
@@ -147,8 +147,8 @@ Sidecar::~Sidecar() {
 }
 
 void Sidecar::start() {
-  asio::co_spawn(core_->context, Core::become_ready(core_), rethrow);
-  asio::co_spawn(core_->context, Core::stay_healthy(core_), rethrow);
+  spawn(core_->context.get_executor(), Core::become_ready(core_), rethrow);
+  spawn(core_->context.get_executor(), Core::stay_healthy(core_), rethrow);
 }
 
 void Sidecar::set_people(std::size_t count) {

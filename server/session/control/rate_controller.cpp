@@ -17,6 +17,7 @@ constexpr double kForgetPeaks = 1.0 / 2048;
 constexpr double kTickUs = static_cast<double>(kTickNanoseconds) * 1e-3;
 constexpr double kLoadGain = 1.0 / 256, kLateGain = 1.0 / 64;
 constexpr double kMaxWorkTicks = 4;
+constexpr std::uint64_t kLateNs = kTicksPerFrame / 2 * kTickNanoseconds;
 constexpr double kHighLoad = 0.95, kLowLoad = 0.85, kHighLateShare = 0.2;
 constexpr double kMinBudgetShare = 0.5, kShrink = 1.0 / 512, kGrow = 1.0 / 2048;
 
@@ -92,7 +93,7 @@ void RateController::remember_peaks(const step::TickReport& report) {
 void RateController::watch_load(const TickTiming& timing, bool can_lower) {
   const double work = static_cast<double>(timing.work_ns) * 1e-3 / kTickUs;
   load_ += kLoadGain * (std::min(work, kMaxWorkTicks) - load_);
-  const double is_late = timing.lateness_ns > kTickNanoseconds ? 1 : 0;
+  const double is_late = timing.lateness_ns > kLateNs ? 1 : 0;
   late_share_ += kLateGain * (is_late - late_share_);
   is_pressed_ = load_ > kHighLoad || late_share_ > kHighLateShare;
   if (is_pressed_ && can_lower && predicted_us_ <= budget_us())

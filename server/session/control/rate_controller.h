@@ -30,8 +30,9 @@
 //          within 500 ticks of a step up, and is 200 again after 5,000 ticks without one.
 //   budget shrinks by 1/512 of the given one per tick, down to half, when by the prediction all is
 //          well and yet the mean load of about a quarter of a second is above 0.95 or a fifth of
-//          the ticks begin more than a tick late: medians do not see many long spikes. It grows
-//          back four times slower, below a load of 0.85. A stall counts as 4 ticks, however long.
+//          the ticks begin more than half a frame late: medians do not see many long spikes. It
+//          grows back four times slower, below a load of 0.85. A stall counts as 4 ticks, however
+//          long.
 // A step that changes no node sweeps, since its layer is empty, is free and takes no turn. While no
 // node is active there is nothing to give up: the rest of the organ is swept as it must be.
 

@@ -1,12 +1,12 @@
 #include "server/session/monitoring/http_acceptor.h"
 
 #include <algorithm>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <exception>
 #include <utility>
 
 #include "common/base/no_throw.h"
+#include "common/base/spawn.h"
 
 namespace trocar::monitoring {
 namespace {
@@ -60,7 +60,7 @@ bool HttpAcceptor::make_room() {
 }
 
 void HttpAcceptor::start(Serve serve, const std::shared_ptr<void>& owner) {
-  asio::co_spawn(context_, accept(std::move(serve), owner), rethrow);
+  spawn(context_.get_executor(), accept(std::move(serve), owner), rethrow);
 }
 
 asio::awaitable<void> HttpAcceptor::accept(Serve serve, std::shared_ptr<void> owner) {
@@ -75,11 +75,11 @@ asio::awaitable<void> HttpAcceptor::accept(Serve serve, std::shared_ptr<void> ow
     }
     if (open_ >= most_connections_ && !make_room()) continue;  // closes it
     ++open_;
-    asio::co_spawn(context_, serve(std::move(socket)),
-                   [this, owner](const std::exception_ptr& failure) {
-                     --open_;
-                     rethrow(failure);
-                   });
+    spawn(context_.get_executor(), serve(std::move(socket)),
+          [this, owner](const std::exception_ptr& failure) {
+            --open_;
+            rethrow(failure);
+          });
   }
 }
 

@@ -3,7 +3,6 @@
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ssl/error.hpp>
@@ -11,6 +10,7 @@
 #include <optional>
 
 #include "common/base/no_throw.h"
+#include "common/base/spawn.h"
 #include "server/session/monitoring/http_stream.h"
 
 namespace trocar::monitoring {
@@ -87,10 +87,10 @@ asio::awaitable<Result<HttpAnswer>> ask(HttpQuestion question) {
 Result<HttpAnswer> ask_and_wait(HttpQuestion question) {
   asio::io_context context;
   std::optional<Result<HttpAnswer>> answer;
-  asio::co_spawn(
-      context,
-      [&]() -> asio::awaitable<void> { answer.emplace(co_await ask(std::move(question))); },
-      rethrow);
+  const auto work = [&]() -> asio::awaitable<void> {
+    answer.emplace(co_await ask(std::move(question)));
+  };
+  spawn(context.get_executor(), work(), rethrow);
   context.run();
   return std::move(*answer);
 }

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <cstring>
+
+#include "common/base/spawn.h"
 
 namespace trocar::net {
 namespace {
@@ -44,8 +45,8 @@ void Connection::start(Events events) {
   events_ = std::move(events);
   if (!stream_.has_tls()) return begin();
   const auto self = shared_from_this();
-  asio::co_spawn(stream_.socket().get_executor(), greet(),
-                 [self](std::exception_ptr failure) { rethrow(failure); });
+  spawn(stream_.socket().get_executor(), greet(),
+        [self](std::exception_ptr failure) { rethrow(failure); });
 }
 
 asio::awaitable<void> Connection::greet() {
@@ -86,9 +87,8 @@ void Connection::begin() {
   // in the completion handler until the coroutine has ended.
   const auto self = shared_from_this();
   const auto executor = stream_.socket().get_executor();
-  asio::co_spawn(executor, read_frames(), [self](std::exception_ptr failure) { rethrow(failure); });
-  asio::co_spawn(executor, write_outbox(),
-                 [self](std::exception_ptr failure) { rethrow(failure); });
+  spawn(executor, read_frames(), [self](std::exception_ptr failure) { rethrow(failure); });
+  spawn(executor, write_outbox(), [self](std::exception_ptr failure) { rethrow(failure); });
   const auto opened = events_.open;
   if (opened) opened();
 }

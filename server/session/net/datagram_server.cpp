@@ -1,11 +1,11 @@
 #include "server/session/net/datagram_server.h"
 
 #include <algorithm>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <cerrno>
 
 #include "common/base/no_throw.h"
+#include "common/base/spawn.h"
 #include "server/session/net/datagram_socket.h"
 
 namespace trocar::net {
@@ -52,8 +52,8 @@ Result<std::unique_ptr<DatagramServer>> DatagramServer::open(asio::io_context& c
                                                  " cannot be used for datagrams (" +
                                                  error.message() + ")"};
   server->socket_.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes), ignored);
-  asio::co_spawn(context, server->receive(server->is_alive_),
-                 [](std::exception_ptr failure) { rethrow(failure); });
+  spawn(context.get_executor(), server->receive(server->is_alive_),
+        [](std::exception_ptr failure) { rethrow(failure); });
   return server;
 }
 

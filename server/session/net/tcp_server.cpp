@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/base/spawn.h"
 #include "server/session/net/connection.h"
 
 namespace trocar::net {
@@ -63,10 +63,10 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
   void start(ConnectionHandler& to) {
     handler = &to;
     const auto self = shared_from_this();
-    asio::co_spawn(acceptor.get_executor(), accept_connections(),
-                   [self](std::exception_ptr failure) { rethrow(failure); });
-    asio::co_spawn(acceptor.get_executor(), sweep_deadlines(),
-                   [self](std::exception_ptr failure) { rethrow(failure); });
+    spawn(acceptor.get_executor(), accept_connections(),
+          [self](std::exception_ptr failure) { rethrow(failure); });
+    spawn(acceptor.get_executor(), sweep_deadlines(),
+          [self](std::exception_ptr failure) { rethrow(failure); });
   }
 
   void stop_accepting() {

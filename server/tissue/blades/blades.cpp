@@ -27,21 +27,21 @@ bool BladeTable::has_jumped(const Blade& blade, const EdgeEnds& ends) {
   return std::max(length(ends[0] - before[0]), length(ends[1] - before[1])) > kFastest_m;
 }
 
-std::uint32_t BladeTable::begin_tick(const hands::ToolTable& tools, const hands::ClaimTable& claims,
-                                     bool can_cut) {
+std::uint32_t BladeTable::begin_tick(const Hands& hands, bool can_cut) {
   static_assert(kMaxTools <= 32);
   std::uint32_t lifted = 0;
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
-    const auto& tool = tools[ToolSlot{i}];
-    const auto& claim = claims.claim(ToolSlot{i});
+    const auto& tool = hands.tools[ToolSlot{i}];
+    const auto& claim = hands.claims.claim(ToolSlot{i});
     Blade& blade = blades_[i];
     const bool is_held = claim.phase == hands::ClaimPhase::Held;
     const bool is_at_work = tool.has_sample && claim.verb == tool::Verb::Cut &&
                             (is_held || claim.phase == hands::ClaimPhase::Wanted);
     if (!is_at_work && !blade.is_at_work) continue;
-    const bool is_cutting = is_at_work && is_held && can_cut && hands::can_cut(tool);
+    const bool waits = (hands.waiting >> i & 1) != 0;
+    const bool is_cutting = is_at_work && is_held && can_cut && !waits && hands::can_cut(tool);
     const bool is_stopped =
-        is_at_work && !is_held && claim.last_refusal == hands::ClaimOutcome::RefusedHeld;
+        is_at_work && (is_held ? waits : claim.last_refusal == hands::ClaimOutcome::RefusedHeld);
     const bool is_new = !blade.is_at_work || has_jumped(blade, hands::edge_of(tool));
     if (blade.is_cutting && (!is_cutting || is_new)) lifted |= 1u << i;
     if (!is_at_work || is_new)

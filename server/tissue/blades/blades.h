@@ -2,9 +2,10 @@
 
 // The blades of a session: which of them cut in this tick, and what hands feel of them.
 //
-// A blade cuts while its claim is held, and feels what edge_force.h says. Where a claim is refused
-// the blade is stopped: a hand that goes on feels a spring from there, which lets it back. Of
-// scissors a hand feels nothing: what they cut, their closing works for.
+// A blade cuts while its claim is held, and feels what edge_force.h says. Where a claim is refused,
+// or while it is to wait, the blade is stopped: a hand that goes on feels a spring from there,
+// which lets it back. What it has planned by then is cut; after that it begins anew, where it is.
+// A hand feels nothing of what scissors cut: their closing does that work.
 //
 // The force follows by at most kMostStep_n in a tick where one of these ends and another begins,
 // and after a blade is lifted.
@@ -45,12 +46,17 @@ struct BladeWound {
 
 class BladeTable {
  public:
+  struct Hands {
+    const hands::ToolTable& tools;
+    const hands::ClaimTable& claims;
+    std::uint32_t waiting = 0;  // bits of tools whose blades are to wait
+  };
+
   const Blade& operator[](ToolSlot tool) const { return blades_[tool.value]; }
 
   // Before a tick's cut. can_cut: claims are in effect. Returns, as bits, the tools whose blades
   // cut no more, or have appeared elsewhere: they are to be lifted.
-  std::uint32_t begin_tick(const hands::ToolTable& tools, const hands::ClaimTable& claims,
-                           bool can_cut);
+  std::uint32_t begin_tick(const Hands& hands, bool can_cut);
   // Says what tissue the edge of a blade that cuts meets. breadth_m: of both its sides together.
   void look(ToolSlot tool, const cutting::EdgeResistance& resistance, double breadth_m) {
     blades_[tool.value].edge.look(resistance, breadth_m);

@@ -42,14 +42,14 @@ void TissueCuts::tear(const world::World& world, std::span<const NodeIndex> node
   if (can_tear() && !is_full()) cutter_->tear(tearing_.find(topology_, world.displacements, nodes));
 }
 
-std::optional<topology::Edit> TissueCuts::cut(const hands::ToolTable& tools,
-                                              const hands::ClaimTable& claims,
+std::optional<topology::Edit> TissueCuts::cut(const BladeTable::Hands& hands,
                                               const world::World& world, double travel_m,
                                               CutReport& report) {
+  const auto& tools = hands.tools;
   report = {};
   if (!can_cut()) return std::nullopt;
   report.is_full = is_full();
-  const auto lifted = blades_.begin_tick(tools, claims, !report.is_full);
+  const auto lifted = blades_.begin_tick(hands, !report.is_full);
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if ((lifted >> i & 1) != 0) cutter_->lift(i);
     if (!blades_[ToolSlot{i}].is_cutting) continue;

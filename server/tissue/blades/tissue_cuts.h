@@ -37,6 +37,11 @@ class TissueCuts {
   // Returns what the tissue does to a blade.
   const Wrench& felt(ToolSlot tool) const { return blades_[tool].felt; }
   const EdgeForce& edge(ToolSlot tool) const { return blades_[tool].edge; }
+  // Returns how fast a blade goes through whole tissue, m/s; 0 for one that does not cut.
+  float cutting_speed_m_s(ToolSlot tool) const {
+    const Blade& blade = blades_[tool];
+    return blade.is_at_work && blade.is_cutting ? blade.edge.cutting_speed_m_s() : 0;
+  }
 
   // Looks for tissue around these nodes that is stretched too far; it tears in the next cut().
   void tear(const world::World& world, std::span<const NodeIndex> nodes);
@@ -46,8 +51,8 @@ class TissueCuts {
   // an edit if the topology has changed: hand it to all who follow the topology, among them
   // extend_layout(), then call end_edit().
   // travel_m: a sum over ticks of the farthest that any node has moved.
-  std::optional<topology::Edit> cut(const hands::ToolTable& tools, const hands::ClaimTable& claims,
-                                    const world::World& world, double travel_m, CutReport& report);
+  std::optional<topology::Edit> cut(const BladeTable::Hands& hands, const world::World& world,
+                                    double travel_m, CutReport& report);
   void end_edit() { topology_.clear_changes(); }
   // Gives what has come to the surface its slots and numbers. The world has applied the edit.
   void extend_layout(const topology::Edit& edit, const world::World& world);

@@ -8,8 +8,8 @@
 namespace trocar::contact {
 namespace {
 
-constexpr int kMaxPushesOut = 24;
-constexpr float kOutside_m = 1e-6f;
+// Friction makes force of where a tool stands: a thin tip feels a micrometre.
+constexpr float kOutside_m = 1e-7f;
 // This part of a tool's radius may be left inside where the surface holds it from all sides. A tool
 // that is deeper goes back to where it was, if it is less deep there.
 constexpr float kLeftInside = 0.1f;
@@ -23,17 +23,72 @@ struct Depenetration {
   Vec3f moved;      // m, of the tool
   float depth = 0;  // m, of the point that is still deepest inside
 };
-// Pushes the tool out where it is deepest, then where it is deepest after that, and so on.
-Depenetration depenetrate(const PlaneArrays& planes, const Vec3f& from) {
-  Depenetration result{from};
-  for (int i = 0; i <= kMaxPushesOut; ++i) {
-    const auto deepest = planes.deepest(result.moved, kOutside_m);
-    result.depth = deepest.depth;
-    if (deepest.point == PlaneArrays::kNone || i == kMaxPushesOut) break;
-    result.moved -= planes.normal(deepest.point) * result.depth;
+
+// WayOut leads a tool to the nearest place outside of all planes (Hildreth 1957): in each turn the
+// plane that is worst off pushes the tool out of it, or lets it back by what it pushed too far.
+// That place follows the planes evenly. One that pushes alone lead to does not: tissue that hardly
+// moves would throw a thin tip to and fro. O(turns times points / 8).
+class WayOut {
+ public:
+  WayOut(const PlaneArrays& planes, const Vec3f& from) : planes_(planes), moved_(from) {
+    for (int i = 0; i < kMostTurns && take_turn(); ++i) {
+    }
   }
-  return result;
-}
+  Depenetration end() const { return {moved_, planes_.deepest(moved_, kOutside_m).depth}; }
+
+ private:
+  static constexpr int kMostTurns = 128;
+  static constexpr std::size_t kMostWalls = 16;
+  // A plane that keeps the tool out.
+  struct Wall {
+    std::size_t point = 0;
+    Vec3f normal;
+    float depth = 0;   // m, of its point if the tool had not moved
+    float pushed = 0;  // m, out of it in all
+  };
+
+  // Returns whether there was something to do.
+  bool take_turn() {
+    const auto deepest = planes_.deepest(moved_, kOutside_m);
+    if (let_back(deepest.depth)) return true;
+    if (deepest.point == PlaneArrays::kNone) return false;
+    push(deepest);
+    return true;
+  }
+  // Lets the tool back from the wall that pushed it farthest beyond, if by more than at_least, m.
+  bool let_back(float at_least) {
+    std::size_t farthest = count_;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const auto& wall = walls_[i];
+      const float beyond = std::min(-wall.depth - dot(wall.normal, moved_), wall.pushed);
+      if (beyond > at_least) at_least = beyond, farthest = i;
+    }
+    if (farthest == count_) return false;
+    Wall& wall = walls_[farthest];
+    moved_ += wall.normal * at_least;
+    wall.pushed -= at_least;
+    if (!(wall.pushed > 0)) wall = walls_[--count_];
+    return true;
+  }
+  // Pushes by walls beyond kMostWalls are not let back.
+  void push(const PlaneArrays::Deepest& deepest) {
+    const Vec3f normal = planes_.normal(deepest.point);
+    const auto end = walls_.begin() + count_;
+    const auto found = std::find_if(walls_.begin(), end,
+                                    [&](const Wall& wall) { return wall.point == deepest.point; });
+    if (found != end)
+      found->pushed += deepest.depth;
+    else if (count_ < kMostWalls)
+      walls_[count_++] = {deepest.point, normal, deepest.depth - dot(normal, moved_),
+                          deepest.depth};
+    moved_ -= normal * deepest.depth;
+  }
+
+  const PlaneArrays& planes_;
+  Vec3f moved_;
+  std::array<Wall, kMostWalls> walls_;
+  std::size_t count_ = 0;
+};
 
 void follow_push(const ContactList& contacts, const ToolContact& tool, const world::World& world,
                  const hands::Tool& hand, PlaneArrays& planes, Proxy& proxy) {
@@ -57,9 +112,9 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
     proxy.point_ids.push_back(point.id);
     proxy.anchors.push_back(tool.goal.apply_inverse(rest_position_of(point, world) + held));
   }
-  auto out = depenetrate(planes, {});
+  auto out = WayOut(planes, {}).end();
   if (out.depth > kLeftInside * hand.shape.radius_m) {
-    const auto back = depenetrate(planes, tool.start.position - tool.goal.position);
+    const auto back = WayOut(planes, tool.start.position - tool.goal.position).end();
     if (back.depth < out.depth) {
       out = back;
       proxy.pose.orientation = tool.start.orientation;

@@ -99,11 +99,19 @@ void CutMesh::collect(std::span<const PatchTriangle> patch, double reaches,
   std::sort(out.begin(), out.end());
 }
 
-double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share) {
+double CutMesh::length_floor_h() const {
+  const auto uncut =
+      std::max<std::size_t>(topology_.organ().mesh.tets.size(), settings_.roomy_tets);
+  const double growth = static_cast<double>(topology_.tet_count()) / static_cast<double>(uncut);
+  if (growth < settings_.growing) return settings_.length_floor_h;
+  return growth < settings_.grown ? settings_.growing_length_floor_h
+                                  : settings_.grown_length_floor_h;
+}
+
+double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double least_h) {
   const auto rest = topology_.rest();
   const double edge = length(rest[b.value] - rest[a.value]), share = t / 65536.0;
-  const double least_length =
-      length_share * settings_.length_floor_h * (h_[a.value] + h_[b.value]) / 2;
+  const double least_length = least_h * (h_[a.value] + h_[b.value]) / 2;
   if (t == 0 || edge * std::min(share, 1 - share) < least_length) return -1;
   const Vec3d middle = along(rest[a.value], rest[b.value], t);
   ring_of(topology_, a, b, ring_);

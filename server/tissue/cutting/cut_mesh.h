@@ -69,9 +69,12 @@ class CutMesh {
   CutOutput& out() { return *out_; }
   Places& places() { return places_; }
 
+  // Returns what no part of an edge that a blade splits may be shorter than, by how much the mesh
+  // has grown, in h.
+  double length_floor_h() const;
   // The smallest sine of all tets that a split would make, or -1 if a part would be shorter than
-  // this share of the floor.
-  double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
+  // this many h.
+  double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double least_h);
   NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
   // Moves a node; can_move() must allow it.
   void move(const Move& move);

@@ -18,11 +18,12 @@ constexpr double kLeastGain = 1e-4;  // h^2
 }  // namespace
 
 bool Repair::split_pinched_edges(CutMesh& mesh, Stroke& stroke) {
+  const double least_h = kLengthShare * mesh.settings().length_floor_h;
   bool has_changed = false;
   for (const auto& breach : breaches_) {
     if (!breach.other.is_valid()) continue;
     ring_of(mesh.topology(), breach.node, breach.other, ring_);
-    if (ring_.empty() || mesh.sine_after_split(breach.node, breach.other, kMiddle, kLengthShare) <
+    if (ring_.empty() || mesh.sine_after_split(breach.node, breach.other, kMiddle, least_h) <
                              kFloorShare * mesh.floor_sine())
       continue;
     stroke.label(mesh.split(breach.node, breach.other, kMiddle));
@@ -43,12 +44,13 @@ bool Repair::pull_back(CutMesh& mesh, Stroke& stroke, Opening& opening,
   }
   std::sort(others_.begin(), others_.end());
   others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
+  const double least_h = kLengthShare * mesh.settings().length_floor_h;
   for (const auto other : others_)
-    if (mesh.sine_after_split(breach.node, other, kMiddle, kLengthShare) <
+    if (mesh.sine_after_split(breach.node, other, kMiddle, least_h) <
         kFloorShare * mesh.floor_sine())
       return false;
   for (const auto other : others_) {
-    if (mesh.sine_after_split(breach.node, other, kMiddle, kLengthShare) <
+    if (mesh.sine_after_split(breach.node, other, kMiddle, least_h) <
         kFloorShare * mesh.floor_sine())
       return true;
     stroke.label(mesh.split(breach.node, other, kMiddle));

@@ -17,7 +17,13 @@ struct Settings {
   double extension_h = 0.3;  // how far the patch goes ahead of the blade and past its ends
   // Sine of 8 degrees. A mesh whose own worst angle is below it gets 0.9 of that instead.
   double floor_sine = 0.13917310096006544;
-  double length_floor_h = 0.2;
+  // No part of a split edge is shorter; where the mesh has grown, so that it grows no more than a
+  // tick has time for, parts are longer.
+  double length_floor_h = 0.2, growing_length_floor_h = 0.35, grown_length_floor_h = 0.5;
+  // A mesh is growing, and has grown, with so many times the tets that it had uncut. Small organs
+  // have room for this many before that.
+  double growing = 1.1, grown = 1.3;
+  std::uint32_t roomy_tets = 8000;
   // Motion is collected until it is so long, or so many ticks old.
   double collect_h = 0.1;
   std::uint32_t collect_ticks = 8;

@@ -165,7 +165,8 @@ bool Splitter::split(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget) {
     if (stroke.is_labelled(crossing.a) || stroke.is_labelled(crossing.b)) continue;
     if (budget == 0) return false;
     const auto t = quantised_share(crossing.t);
-    if (mesh.sine_after_split(crossing.a, crossing.b, t) >= mesh.floor_sine()) {
+    if (mesh.sine_after_split(crossing.a, crossing.b, t, mesh.length_floor_h()) >=
+        mesh.floor_sine()) {
       stroke.label(mesh.split(crossing.a, crossing.b, t));
       budget -= std::min(budget, static_cast<std::uint32_t>(mesh.last_ring()));
     } else {

@@ -43,8 +43,20 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::size_t kUsualSweeps = 64;
 // If a node's step was not finite, the nodes within so many layers of it are restored with it.
 constexpr int kRestoredLayers = 3;
-// The drag of folded domains is so many times the inertia that would do for them.
+// Drag is so many times the inertia that would do for domains that are folded or drawn out.
 constexpr float kDrag = 2;
+
+// Returns the mean velocity of who shares a smoothing domain with each node; velocities: per slot.
+Vec8 velocity_around(const NodalStrain& strain, Group group, const Float4* velocities) {
+  Vec8 sum = zero_vec8();
+  Float8 count = all(0);
+  for (const auto& member : strain.members(group)) {
+    const Vec8 part = load(member.part);
+    const Float8 one = where(_mm256_cmp_ps(dot8(part, part), all(0), _CMP_GT_OQ), all(1));
+    sum = fma8(gather(velocities, member.node), one, sum), count = count + one;
+  }
+  return sum * (all(1) / _mm256_max_ps(count, all(1)));
+}
 
 float sum(const Lanes& a) {
   return ((a.v[0] + a.v[4]) + (a.v[2] + a.v[6])) + ((a.v[1] + a.v[5]) + (a.v[3] + a.v[7]));
@@ -210,9 +222,14 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
     if (is_slow(group)) least *= 3 - 2 / static_cast<float>(far_interval_);
     const Float8 added =
         where(moves, _mm256_max_ps(fma8(nodal.stiffness, all(least), all(0) - inertia), all(0)));
-    // Drag resists a node's motion, not the change of it.
-    inertia = inertia + added + where(moves, nodal.drag * all(kDrag * least));
     momentum = fma8(ahead - start, added, momentum) - nodal.gradient;
+    // Drag resists a node's motion, not the change of it; against those around it, for what falls
+    // as a whole is not held back.
+    const Float8 drag = where(moves, nodal.drag * all(kDrag * least));
+    if (_mm256_movemask_ps(_mm256_cmp_ps(drag, all(0), _CMP_GT_OQ)) != 0)
+      momentum =
+          fma8(velocity_around(*tissue_.nodal_strain(), group, v_.data()), drag / rate, momentum);
+    inertia = inertia + added + drag;
   }
   store(inertia_[group].inertia, inertia);
   store(inertia_[group].momentum, momentum);

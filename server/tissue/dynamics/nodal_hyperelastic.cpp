@@ -5,6 +5,15 @@ namespace {
 
 // A domain that has less than this share of its volume begins to fold, or is folded.
 constexpr float kFoldsFrom = 0.4f, kIsFolded = 0.2f;
+// One with this I1 begins to be drawn out, threefold, or is, fourfold. The inertia that its
+// stiffness asks for may be hundreds of times its mass: it would fly on, whatever pulls it back.
+constexpr float kDrawnFrom = 9, kIsDrawn = 18;
+
+// Returns 0 up to `from`, 1 from `until` on.
+Float8 share(Float8 value, float from, float until) {
+  return _mm256_max_ps(_mm256_min_ps((value - all(from)) * all(1 / (until - from)), all(1)),
+                       all(0));
+}
 
 }  // namespace
 
@@ -107,14 +116,13 @@ void NodalHyperelastic<Law>::add_stress(Group group, const NodalStrain::Gradient
                     _mm256_max_ps(dot8(k1, k1) + (k01 + k12), dot8(k2, k2) + (k02 + k12)));
   const Float8 bound = fma8(bulk, largest, stiff) * f.inverse_volume;
   stress.stiffness = stress.stiffness + bound;
-  const Float8 folded = _mm256_max_ps(
-      _mm256_min_ps((all(kFoldsFrom) - volume_ratio) * all(1 / (kFoldsFrom - kIsFolded)), all(1)),
-      all(0));
-  if (_mm256_movemask_ps(_mm256_cmp_ps(folded, all(0), _CMP_GT_OQ)) == 0) return;
-  // The volume's second derivative is no larger than the gradient.
   const Float8 squared = dot8(f0, f0) + (dot8(f1, f1) + dot8(f2, f2));
+  const Float8 is_extreme = _mm256_max_ps(share(volume_ratio, kFoldsFrom, kIsFolded),
+                                          share(squared, kDrawnFrom, kIsDrawn));
+  if (_mm256_movemask_ps(_mm256_cmp_ps(is_extreme, all(0), _CMP_GT_OQ)) == 0) return;
+  // The volume's second derivative is no larger than the gradient.
   const Float8 geometric = abs8(pressure) * _mm256_sqrt_ps(squared) * f.inverse_volume;
-  stress.drag = fma8(folded, bound + geometric, stress.drag);
+  stress.drag = fma8(is_extreme, bound + geometric, stress.drag);
 }
 
 template <typename Law>

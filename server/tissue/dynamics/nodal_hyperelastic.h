@@ -18,8 +18,8 @@ struct NodalStress8 {
   std::array<Vec8, NodalStrain::kRows> rows;  // of dW/dF, W the energy per volume, Pa
   // Times |b|^2, a node's b there, it is at least the stiffness against the node's moves, Pa/m^3.
   Float8 stiffness;
-  // Is that of folded domains, with what their shape adds, and 0 of all others: overdamped, they
-  // cannot swing.
+  // Is that of domains that are folded or drawn out, with what their shape adds, and 0 of all
+  // others: overdamped, they can neither swing nor fly.
   Float8 drag;
 };
 

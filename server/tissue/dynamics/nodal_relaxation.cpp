@@ -82,7 +82,8 @@ RelaxationTerms::Response NodalRelaxation::response_of(const Block& block,
 void NodalRelaxation::begin_block(std::size_t index, const world::StressHistory& history,
                                   RelaxationTerms::Constants& scratch) {
   const Block& block = blocks_[index];
-  set_relaxed(block, terms_.ahead(history.block(index), terms_.of(block.materials, {}, scratch)));
+  const auto& c = terms_.of(block.materials, history.last_span(index), scratch);
+  set_relaxed(block, terms_.ahead(history.block(index), c));
 }
 
 std::uint64_t NodalRelaxation::end_block(std::size_t index, world::StressHistory& history,

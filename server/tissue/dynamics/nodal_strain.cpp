@@ -166,18 +166,7 @@ std::size_t NodalStrain::fill(const topology::Topology& topology, const Groups& 
 }
 
 void NodalStrain::restart_group(Group group, const Float4* x) {
-  const Vec8 own = load_group(x + group * kLanes);
-  std::array<Vec8, 3> h{zero_vec8(), zero_vec8(), zero_vec8()};
-  for (const Member& member : members_[group]) {
-    const Vec8 u = gather(x, member.node) - own, b = load(member.part);
-    h[0] = fma8(b, u.x, h[0]), h[1] = fma8(b, u.y, h[1]), h[2] = fma8(b, u.z, h[2]);
-  }
-  const std::size_t first = group * kLanes;
-  for (std::size_t r = 0; r < 3; ++r) {
-    Float8 beside;
-    const Vec8 rest = load_strided(&at_rest_[first][r], kRows, beside);
-    store_strided(&gradients_[kRows * first + r], kRows, rest + h[r], beside);
-  }
+  restarted(group, x);
 }
 
 // Eight lanes, one after another: nodes of a group share no smoothing domain.

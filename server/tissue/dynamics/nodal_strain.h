@@ -93,8 +93,8 @@ class NodalStrain {
     Float8 inverse_volume, two_c10, bulk;
   };
   [[gnu::always_inline]] inline Gradient gradient_at(const SlotLanes& places) const;
-  // Returns those of the group's own nodes.
-  [[gnu::always_inline]] inline Gradient gradient_of(Group group) const;
+  // Restarts a group, and returns the gradients of its nodes.
+  [[gnu::always_inline]] inline Gradient restarted(Group group, const Float4* x);
 
  private:
   // While rows are filled: a node's part in a smoothing domain, and the other's in the node's own.
@@ -132,12 +132,20 @@ inline NodalStrain::Gradient NodalStrain::gradient_at(const SlotLanes& places) c
   return f;
 }
 
-inline NodalStrain::Gradient NodalStrain::gradient_of(Group group) const {
-  const Float4* const first = &gradients_[kRows * kLanes * group];
+inline NodalStrain::Gradient NodalStrain::restarted(Group group, const Float4* x) {
+  const Vec8 own = load_group(x + group * kLanes);
+  std::array<Vec8, kRows> h{zero_vec8(), zero_vec8(), zero_vec8()};
+  for (const Member& member : members_[group]) {
+    const Vec8 u = gather(x, member.node) - own, b = load(member.part);
+    h[0] = fma8(b, u.x, h[0]), h[1] = fma8(b, u.y, h[1]), h[2] = fma8(b, u.z, h[2]);
+  }
+  const std::size_t first = group * kLanes;
   Gradient f;
-  f.rows[0] = load_strided(first, kRows, f.inverse_volume);
-  f.rows[1] = load_strided(first + 1, kRows, f.two_c10);
-  f.rows[2] = load_strided(first + 2, kRows, f.bulk);
+  Float8* const beside[kRows] = {&f.inverse_volume, &f.two_c10, &f.bulk};
+  for (std::size_t r = 0; r < kRows; ++r) {
+    f.rows[r] = load_strided(&at_rest_[first][r], kRows, *beside[r]) + h[r];
+    store_strided(&gradients_[kRows * first + r], kRows, f.rows[r], *beside[r]);
+  }
   finish(f);
   return f;
 }

@@ -24,10 +24,15 @@ bool Relaxation::is_needed(const organ::Organ& organ) {
 }
 
 Relaxation::Relaxation(const topology::Topology& topology, const Groups& groups,
-                       const NodalStrain* strain)
-    : organ_(topology.organ()), nodal_strain_(strain), terms_(topology.organ()), loads_(kCorners) {
+                       const NodalStrain* strain, StrainScheme scheme)
+    : organ_(topology.organ()),
+      nodal_strain_(strain),
+      terms_(organ_, RelaxationTerms::Use::InTurns),
+      nodal_terms_(organ_, scheme == StrainScheme::Explicit ? RelaxationTerms::Use::UntilTurn
+                                                            : RelaxationTerms::Use::InTurns),
+      loads_(1) {
   if (world::RelaxationState::has_nodal(organ_))
-    nodal_relaxation_ = std::make_unique<NodalRelaxation>(topology, groups, *strain, terms_);
+    nodal_relaxation_ = std::make_unique<NodalRelaxation>(topology, groups, *strain, nodal_terms_);
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) set_lane(topology, groups, TetIndex(t));
   blocks_of_.resize(groups.slot_count());
   for (Slot slot = 0; slot < groups.slot_count(); ++slot) list_blocks_of(topology, groups, slot);
@@ -50,7 +55,7 @@ void Relaxation::set_lane(const topology::Topology& topology, const Groups& grou
   if (index >= blocks_.size()) {
     blocks_.resize(index + 1);
     shares_.resize(index + 1);
-    loads_.resize(((index + 1) * kLanes + 1) * kCorners);
+    loads_.resize((index + 1) * kLanes + 1);
     for (std::size_t i = 0; i < kLanes; ++i)
       for (std::size_t k = 0; k < 3; ++k)
         blocks_[index].rest[k].set(
@@ -105,11 +110,12 @@ void Relaxation::update(const topology::Topology& topology, const Groups& groups
 }
 
 void Relaxation::set_dt(float dt) {
-  terms_.set_dt(dt);
   is_stale_ = true;
   for (turns_ = 1;
        turns_ < RelaxationTerms::kMostSteps / 2 && 2 * static_cast<float>(turns_) * dt <= kTurn_s;)
     turns_ *= 2;
+  terms_.set_dt(dt, turns_);
+  nodal_terms_.set_dt(dt, turns_);
 }
 
 RelaxationTerms::Response Relaxation::response_of(const Block& block,
@@ -162,16 +168,14 @@ void Relaxation::set_loads(const Block& block, std::size_t index, const SymMat8&
   const Float8 bc = dot8(b, qc), bd = dot8(b, qd), cd = dot8(c, qd);
   const Float8 ab = all(0) - (dot8(b, qb) + bc + bd), ac = all(0) - (dot8(c, qc) + bc + cd),
                ad = all(0) - (dot8(d, qd) + bd + cd);
-  Float4* const out = &loads_[(index * kLanes + 1) * kCorners];
-  store_strided(out, kCorners, {ab, ac, ad}, all(0));
-  store_strided(out + 1, kCorners, {bc, bd, ab}, all(0));
-  store_strided(out + 2, kCorners, {cd, ac, bc}, all(0));
-  store_strided(out + 3, kCorners, {ad, bd, cd}, all(0));
+  auto* const out = reinterpret_cast<Float4*>(&loads_[index * kLanes + 1]);
+  store_strided(out, 2, {ab, ac, ad}, bc);
+  store_strided(out + 1, 2, {bd, cd, all(0)}, all(0));
 }
 
 void Relaxation::begin_block(std::size_t index, const world::StressHistory& history,
                              RelaxationTerms::Constants& scratch) {
-  const auto& c = terms_.of(blocks_[index].materials, {}, scratch);
+  const auto& c = terms_.of(blocks_[index].materials, history.last_span(index), scratch);
   set_loads(blocks_[index], index, terms_.ahead(history.block(index), c));
 }
 

@@ -11,13 +11,18 @@
 // one step (4e-4 of it for liver at 1 ms) that is gone after it: what has relaxed by then is a
 // stress that stays the same in the step, and with it the forces on nodes (relaxed_stress.h).
 //
-// Tets take turns, and are advanced over as many steps at once, which is as exact; until then what
-// they have relaxed acts on as it was. A turn comes once in kTurn_s, or in each step near what is
-// solved where nothing is solved roughly. In 8 ms liver relaxes by 0.7 % of its stress at most.
-// A step costs O(tets whose turn it is).
+// Tets take turns, and are advanced over as many steps at once, which is as exact. Between two
+// turns acts what will have relaxed on average in that time if the stress stays as it is: with T
+// steps from turn to turn, (T + 1)/2 steps later where forces are taken in each step, T later where
+// nodes take them in turns of their own and keep them. Over nodes and turns, tissue that is held
+// then has the force it should; a single force is off by T/2 steps at most, or by T. A turn comes
+// once in kTurn_s, or in each step near what is solved where nothing is solved roughly. In 8 ms
+// liver relaxes by 0.7 % of its stress at most. A step costs O(tets whose turn it is).
 //
 // NodalStrain, where strain is averaged, relax as tets do (nodal_relaxation.h). Between steps the
 // state is world::RelaxationState.
+
+#include <immintrin.h>
 
 #include <memory>
 #include <vector>
@@ -25,6 +30,7 @@
 #include "common/base/workers.h"
 #include "common/wire/figures.h"
 #include "server/tissue/dynamics/nodal_relaxation.h"
+#include "server/tissue/dynamics/strain_scheme.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::dynamics {
@@ -40,7 +46,8 @@ class Relaxation {
 
   // The topology's organ and the smoothing domains must outlive it. NodalStrain: null if nothing is
   // averaged; they are to be where the tissue is in settle() and end_step().
-  Relaxation(const topology::Topology& topology, const Groups& groups, const NodalStrain* strain);
+  Relaxation(const topology::Topology& topology, const Groups& groups, const NodalStrain* strain,
+             StrainScheme scheme);
 
   // Tets and smoothing domains at nodes in these lanes anew; with smoothing domains, lanes as for
   // NodalStrain::rebuild().
@@ -65,14 +72,28 @@ class Relaxation {
     return index / kRun % turns_ == step % turns_;
   }
 
-  // Returns the loads of relaxed stress: N/m per edge of each tet, along the edge as it is. Those
-  // from a corner c to corners c + 1, c + 2 and c + 3, modulo 4, are at loads_index(); those at
-  // kNoLoads are zero. So a node reads each of its tets in one piece.
-  const Float4* loads() const { return loads_.data(); }
+  // The loads of relaxed stress on a tet's edges, N/m, along the edge as it is: ab, ac, ad, bc, bd,
+  // cd, and two zeros.
+  using Loads = Lanes;
+  static_assert(kLanes == 8);
+  // Returns those of all tets, to be read by loads_of_corner(). Those at kNoLoads are zero.
+  const Loads* loads() const { return loads_.data(); }
   static std::uint32_t loads_index(TetIndex tet, std::size_t corner) {
     return static_cast<std::uint32_t>((tet.value + 1) * kCorners + corner);
   }
   static constexpr std::uint32_t kNoLoads = 0;
+  // Returns the loads at loads_index() from its corner c to corners c + 1, c + 2 and c + 3,
+  // modulo 4.
+  static __m128 loads_of_corner(const Loads* loads, std::uint32_t index) {
+    alignas(32) static constexpr std::int32_t kPlaces[kCorners][kLanes] = {
+        {0, 1, 2, 6}, {3, 4, 0, 6}, {5, 1, 3, 6}, {2, 4, 5, 6}};
+    const __m256i places =
+        _mm256_load_si256(reinterpret_cast<const __m256i*>(kPlaces[index % kCorners]));
+    return _mm256_castps256_ps128(_mm256_permutevar8x32_ps(load(loads[index / kCorners]), places));
+  }
+  static void prefetch(const Loads* loads, std::uint32_t index) {
+    _mm_prefetch(reinterpret_cast<const char*>(loads + index / kCorners), _MM_HINT_T0);
+  }
   // Returns the relaxation of smoothing domains; null if none relaxes.
   const NodalRelaxation* nodal() const { return nodal_relaxation_.get(); }
 
@@ -106,7 +127,7 @@ class Relaxation {
 
   const organ::Organ& organ_;
   const NodalStrain* const nodal_strain_;
-  RelaxationTerms terms_;
+  RelaxationTerms terms_, nodal_terms_;
   std::unique_ptr<NodalRelaxation> nodal_relaxation_;
   std::vector<Block> blocks_;
   std::vector<RelaxationShares> shares_;
@@ -116,7 +137,7 @@ class Relaxation {
   std::vector<std::uint32_t> due_,
       due_stamp_;  // blocks of tets, then of smoothing domains; per block
   std::uint32_t current_ = 0;
-  std::vector<Float4> loads_;  // [tet][corner], after zeros
+  std::vector<Loads> loads_;  // per tet, after zeros
   bool is_stale_ = true;
   std::vector<std::uint32_t> stale_;                       // blocks, unless is_stale_
   std::vector<TetIndex> tets_;                             // while it follows

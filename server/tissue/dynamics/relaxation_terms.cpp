@@ -70,16 +70,24 @@ Float8 product8(const SymMat8& a, const SymMat8& b) {
          fma8(a.xy, b.xy, fma8(a.xz, b.xz, a.yz * b.yz)) * all(2);
 }
 
-RelaxationTerms::RelaxationTerms(const organ::Organ& organ)
-    : organ_(organ), terms_(world::RelaxationState::terms_of(organ)) {}
+RelaxationTerms::RelaxationTerms(const organ::Organ& organ, Use use)
+    : organ_(organ), use_(use), terms_(world::RelaxationState::terms_of(organ)) {}
 
-void RelaxationTerms::set_dt(float dt) {
+void RelaxationTerms::set_dt(float dt, std::uint32_t turns) {
   dt_ = dt;
+  turns_ = turns;
   constants_.clear();
   for (std::size_t steps = 1; steps <= kMostSteps; ++steps)
     for (std::size_t i = 0; i <= organ_.regions.size(); ++i)
       constants_.push_back(
           constants_of(organ::material_at(organ_, static_cast<std::uint16_t>(i)), steps));
+}
+
+// A place that is advanced every n steps is used in the n steps after it, (n + 1)/2 later on
+// average. Nodes that take it in turns of their own do so (n - 1)/2 steps later, and keep it.
+double RelaxationTerms::steps_ahead(std::size_t steps) const {
+  const auto n = static_cast<double>(std::min<std::size_t>(steps, turns_));
+  return use_ == Use::InTurns ? n : (n + 1) / 2;
 }
 
 RelaxationTerms::Constants RelaxationTerms::constants_of(const material::Material& material,
@@ -100,25 +108,27 @@ RelaxationTerms::Constants RelaxationTerms::constants_of(const material::Materia
          static_cast<double>(k + 2) * law.coefficients_pa[k + 1] / law.coefficients_pa[0]);
   for (std::size_t k = 0; k < law.relaxation.size(); ++k) {
     const auto& [weight, time_s] = law.relaxation[k];
-    const double next = static_cast<double>(dt_) / time_s, x = static_cast<double>(steps) * next;
+    const double step = static_cast<double>(dt_) / time_s, x = static_cast<double>(steps) * step;
     const double decay = decay_in(x), mean = mean_decay_in(x);
+    const double next_decay = decay_in(steps_ahead(steps) * step);
     auto& term = c.terms[k];
     fill(term.decay, decay);
     fill(term.of_before, weight * (mean - decay));
     fill(term.of_now, weight * (1 - mean));
-    fill(term.next_decay, decay_in(next));
-    fill(term.ahead, weight * (1 - decay_in(next)));
+    fill(term.next_decay, next_decay);
+    fill(term.ahead, weight * (1 - next_decay));
   }
   return c;
 }
 
 const RelaxationTerms::Constants& RelaxationTerms::of(const LaneMaterials& materials,
-                                                      const Steps& age, Constants& scratch) const {
+                                                      const Steps& span, Constants& scratch) const {
   const auto of_lane = [&](std::size_t lane) -> const Constants& {
-    const auto steps = std::clamp<std::size_t>(age[lane], 1, kMostSteps);
+    const auto steps = std::clamp<std::size_t>(span[lane], 1, kMostSteps);
     return constants_[(steps - 1) * (organ_.regions.size() + 1) + materials.of_lane[lane]];
   };
-  if (materials.is_uniform && std::ranges::all_of(age, [&](auto steps) { return steps == age[0]; }))
+  if (materials.is_uniform &&
+      std::ranges::all_of(span, [&](auto steps) { return steps == span[0]; }))
     return of_lane(0);
   scratch.terms.resize(terms_);
   scratch.is_exponential = false;

@@ -28,11 +28,14 @@ class RelaxationTerms {
   // Longest time that a place can wait, in steps: its turn, and once more where a part of a tet
   // that was cut came to be among others.
   static constexpr std::size_t kMostSteps = 16;
+  // Steps that forces of what has relaxed are for: those until the place's next turn, or those of
+  // nodes whose own turn to take them comes at any time until then, and which keep them as long.
+  enum class Use { UntilTurn, InTurns };
   using Steps = world::StressHistory::Steps;
 
   struct Term {
     Lanes decay, of_before, of_now;  // e, g (1 - e - b), g b; over the steps since the last
-    Lanes next_decay, ahead;         // e, g (1 - e); over one step
+    Lanes next_decay, ahead;         // e, g (1 - e); over the steps ahead
   };
   struct Constants {
     Lanes two_c10, bulk;          // Pa
@@ -43,13 +46,14 @@ class RelaxationTerms {
   };
 
   // The organ must outlive it.
-  explicit RelaxationTerms(const organ::Organ& organ);
+  RelaxationTerms(const organ::Organ& organ, Use use);
 
   float dt() const { return dt_; }
-  void set_dt(float dt);
+  // Steps of dt, s; `turns` of them from one turn to the next.
+  void set_dt(float dt, std::uint32_t turns);
 
-  // After set_dt().
-  const Constants& of(const LaneMaterials& materials, const Steps& age, Constants& scratch) const;
+  // After set_dt(). span: steps over which the place is, or was, advanced.
+  const Constants& of(const LaneMaterials& materials, const Steps& span, Constants& scratch) const;
 
   // At once, for the deformation gradient with columns f.
   struct Response {
@@ -59,7 +63,8 @@ class RelaxationTerms {
   };
   static Response response_of(const Constants& c, const Vec8& f0, const Vec8& f1, const Vec8& f2);
 
-  // Returns what will have relaxed at the end of the next step, Pa, from a block of a history.
+  // Returns what will have relaxed, Pa, on average over the steps that forces are for, from a
+  // block of a history. A place that was advanced over so many steps will be over as many.
   SymMat8 ahead(std::span<const float> block, const Constants& c) const;
   // Advances the block to where the stress is `now`; returns its ahead().
   SymMat8 advance(std::span<float> block, const SymMat8& now, const Constants& c) const;
@@ -69,9 +74,13 @@ class RelaxationTerms {
  private:
   Constants constants_of(const material::Material& material, std::size_t steps) const;
 
+  double steps_ahead(std::size_t steps) const;
+
   const organ::Organ& organ_;
+  const Use use_;
   const std::size_t terms_;
   float dt_ = 0;
+  std::uint32_t turns_ = 1;
   std::vector<Constants> constants_;  // [steps - 1][material]
 };
 

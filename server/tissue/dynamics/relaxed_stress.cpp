@@ -14,6 +14,7 @@ RelaxedStress::RelaxedStress(const topology::Topology& topology, const Groups& g
     : groups_(groups),
       relaxation_(relaxation),
       nodal_strain_(strain),
+      rest_(groups.slot_count()),
       forces_(groups.group_count()) {
   rows_.reserve(groups, [&](NodeIndex node) { return topology.tets_of(node).size(); });
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
@@ -24,6 +25,7 @@ void RelaxedStress::rebuild(const topology::Topology& topology, const Groups& gr
                             std::span<const GroupLanes> lanes) {
   rows_.extend(groups);
   forces_.resize(groups.group_count());
+  rest_.resize(groups.slot_count());
   for (const auto group_lanes : lanes) fill(topology, groups, group_lanes);
   rows_.tidy();
 }
@@ -35,24 +37,21 @@ void RelaxedStress::fill(const topology::Topology& topology, const Groups& group
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     tets_[lane].clear();
     if (!lanes.has(lane) || !nodes[lane].is_valid()) continue;
+    rest_[lanes.group * kLanes + lane] = to_float4(to_float(topology.rest()[nodes[lane].value]));
     for (const auto t : topology.tets_of(nodes[lane]))
       if (relaxes(organ::material_at(topology.organ(), topology.material_of(t))))
         tets_[lane].push_back(t);
     counts[lane] = static_cast<std::uint32_t>(tets_[lane].size());
   }
   const auto rows = rows_.reshape(lanes, counts);
-  const auto rest = topology.rest();
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     for (std::size_t i = 0; i < tets_[lane].size(); ++i) {
       const auto t = tets_[lane][i];
       const auto& tet = topology.tet(t);
       const auto own = static_cast<std::size_t>(std::ranges::find(tet, nodes[lane]) - tet.begin());
       rows[i].loads.v[lane] = Relaxation::loads_index(t, own);
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto other = (own + 1 + k) % 4;
-        rows[i].others[k].v[lane] = groups.slot_of(tet[other]);
-        rows[i].edges[k].set(lane, to_float(rest[tet[other].value] - rest[tet[own].value]));
-      }
+      for (std::size_t k = 0; k < 3; ++k)
+        rows[i].others[k].v[lane] = groups.slot_of(tet[(own + 1 + k) % 4]);
     }
 }
 
@@ -71,14 +70,23 @@ Vec8 RelaxedStress::nodal_forces(Group group) const {
 
 // Along an edge a stress pulls its ends together; what has relaxed of it lets them go.
 Vec8 RelaxedStress::forces_at(Group group, const Float4* x) const {
-  const Float4* const all_loads = relaxation_.loads();
-  const Vec8 own = load_group(x + group * kLanes);
+  const auto* const all_loads = relaxation_.loads();
+  const Float4* const rest = rest_.data();
+  // They lie all over the memory: so all are on their way at once.
+  for (const Row& row : rows_[group])
+    for (const auto index : row.loads.v) Relaxation::prefetch(all_loads, index);
+  const Vec8 own = load_group(x + group * kLanes), own_rest = load_group(rest + group * kLanes);
   Vec8 sum = zero_vec8();
   const auto edge = [&](const Row& row, std::size_t k) {
-    return load(row.edges[k]) + (gather(x, row.others[k]) - own);
+    return (gather(rest, row.others[k]) - own_rest) + (gather(x, row.others[k]) - own);
   };
   for (const Row& row : rows_[group]) {
-    const Vec8 loads = gather(all_loads, row.loads);
+    const auto pair = [&](std::size_t lane) {
+      return _mm256_insertf128_ps(
+          _mm256_castps128_ps256(Relaxation::loads_of_corner(all_loads, row.loads.v[lane])),
+          Relaxation::loads_of_corner(all_loads, row.loads.v[lane + 4]), 1);
+    };
+    const Vec8 loads = transpose4(pair(0), pair(1), pair(2), pair(3));
     sum = fma8(edge(row, 0), loads.x, sum);
     sum = fma8(edge(row, 1), loads.y, sum);
     sum = fma8(edge(row, 2), loads.z, sum);
@@ -88,19 +96,21 @@ Vec8 RelaxedStress::forces_at(Group group, const Float4* x) const {
 
 // The same to the bit: where few lanes are asked for, one after another is quicker.
 Vec3f RelaxedStress::force_at(Group group, std::size_t lane, const Float4* x) const {
-  const Float4* const all_loads = relaxation_.loads();
-  const auto displacement = [x](Slot slot) { return _mm_load_ps(&x[slot].x); };
-  const __m128 own = displacement(static_cast<Slot>(group * kLanes + lane));
+  const auto* const all_loads = relaxation_.loads();
+  const auto at = [](const Float4* values, Slot slot) { return _mm_load_ps(&values[slot].x); };
+  const auto slot = static_cast<Slot>(group * kLanes + lane);
+  const __m128 own = at(x, slot), own_rest = at(rest_.data(), slot);
   __m128 sum = _mm_setzero_ps();
   for (const Row& row : rows_[group]) {
-    const Float4& of_tet = all_loads[row.loads.v[lane]];
-    const float loads[] = {of_tet.x, of_tet.y, of_tet.z};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto& edges = row.edges[k];
-      const __m128 rest = _mm_setr_ps(edges.x.v[lane], edges.y.v[lane], edges.z.v[lane], 0);
-      const __m128 edge = _mm_add_ps(rest, _mm_sub_ps(displacement(row.others[k].v[lane]), own));
-      sum = _mm_fmadd_ps(edge, _mm_set1_ps(loads[k]), sum);
-    }
+    Float4 loads;
+    _mm_store_ps(&loads.x, Relaxation::loads_of_corner(all_loads, row.loads.v[lane]));
+    const auto add = [&](std::size_t k, float load_n_m) {
+      const Slot other = row.others[k].v[lane];
+      const __m128 edge =
+          _mm_add_ps(_mm_sub_ps(at(rest_.data(), other), own_rest), _mm_sub_ps(at(x, other), own));
+      sum = _mm_fmadd_ps(edge, _mm_set1_ps(load_n_m), sum);
+    };
+    add(0, loads.x), add(1, loads.y), add(2, loads.z);
   }
   Float4 force;
   _mm_store_ps(&force.x, sum);
@@ -142,7 +152,7 @@ void start_relaxed(const organ::Organ& organ, world::World& world, StrainScheme 
       x[slot] = to_float4(world.displacements[node.value]);
   const NodalStrain* const averaged = strain ? &*strain : nullptr;
   for (Group g = 0; strain && g < groups.group_count(); ++g) strain->restart_group(g, x.data());
-  Relaxation relaxation(topology, groups, averaged);
+  Relaxation relaxation(topology, groups, averaged, scheme);
   relaxation.settle(x.data(), world.relaxation);
   // The loads of tissue that stays as it is do not depend on the step.
   Workers alone(1);

@@ -38,11 +38,11 @@ class RelaxedStress {
                std::span<const GroupLanes> lanes);
 
  private:
-  // A tet seen from one of its nodes: the other three, the edges there, and where their loads are.
+  // A tet seen from one of its nodes: the other three, and where the loads of the edges there are.
+  // Rows are read once in a while and are long gone from the caches then, so they are short.
   struct Row {
     std::array<SlotLanes, 3> others;
     SlotLanes loads;
-    std::array<Vec3Lanes, 3> edges;  // rest pose, m
 
     void pad(std::size_t lane, Slot own) {
       for (auto& other : others) other.v[lane] = own;
@@ -59,6 +59,7 @@ class RelaxedStress {
   const Groups& groups_;
   const Relaxation& relaxation_;
   const NodalStrain* const nodal_strain_;
+  std::vector<Float4> rest_;  // per slot: where its node rests, m
   GroupRows<Row> rows_;
   std::vector<Vec3Lanes> forces_;
   std::array<std::vector<TetIndex>, kLanes> tets_;  // while rows are filled

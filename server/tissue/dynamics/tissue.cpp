@@ -73,8 +73,7 @@ void Tissue::resize_stresses() {
 
 void Tissue::update_nodal_stress(Group group, const Float4* x) {
   constexpr auto kRows = NodalStrain::kRows;
-  nodal_strain_->restart_group(group, x);
-  const auto f = nodal_strain_->gradient_of(group);
+  const auto f = nodal_strain_->restarted(group, x);
   NodalStress8 stress{{zero_vec8(), zero_vec8(), zero_vec8()}, all(0), all(0)};
   for (const auto& energy : averaged_) energy->add_stress(group, f, stress);
   const std::size_t first = kRows * kLanes * group;
@@ -93,19 +92,24 @@ void Tissue::update_nodal_stress(Group group, const Float4* x) {
 }
 
 Tissue::NodalForces Tissue::nodal_forces(Group group) const {
-  NodalForces forces{zero_vec8(), all(0), all(0)};
+  // Sums live in registers, see NodalHyperelastic::add().
+  Vec8 gradient = zero_vec8();
+  Float8 stiffness = all(0), drag = all(0);
   const Float4* const stresses = nodal_stresses_.data();
   for (const auto& row : nodal_strain_->rows(group)) {
     const Vec8 b = load(row.part);
-    Float8 stiffness, drag;
-    const Vec8 p0 = gather(stresses, row.domain, stiffness),
-               p1 = gather(stresses + 1, row.domain, drag), p2 = gather(stresses + 2, row.domain);
-    forces.gradient = forces.gradient + Vec8{dot8(p0, b), dot8(p1, b), dot8(p2, b)};
+    const auto add = [&b](const Vec8& p, Float8 sum) {
+      return fma8(p.z, b.z, fma8(p.y, b.y, fma8(p.x, b.x, sum)));
+    };
+    Float8 of_stiffness, of_drag;
+    gradient.x = add(gather(stresses, row.domain, of_stiffness), gradient.x);
+    gradient.y = add(gather(stresses + 1, row.domain, of_drag), gradient.y);
+    gradient.z = add(gather(stresses + 2, row.domain), gradient.z);
     const Float8 squared = dot8(b, b);
-    forces.stiffness = fma8(stiffness, squared, forces.stiffness);
-    forces.drag = fma8(drag, squared, forces.drag);
+    stiffness = fma8(of_stiffness, squared, stiffness);
+    drag = fma8(of_drag, squared, drag);
   }
-  return forces;
+  return {gradient, stiffness, drag};
 }
 
 template <typename Law>
@@ -144,7 +148,7 @@ void Tissue::add_measured(const topology::Topology& topology) {
 
 void Tissue::add_relaxation(const topology::Topology& topology) {
   if (!Relaxation::is_needed(topology.organ())) return;
-  relaxation_ = std::make_unique<Relaxation>(topology, groups_, nodal_strain_.get());
+  relaxation_ = std::make_unique<Relaxation>(topology, groups_, nodal_strain_.get(), scheme_);
   relaxed_stress_ = std::make_unique<RelaxedStress>(
       topology, groups_, *relaxation_,
       scheme_ == StrainScheme::Implicit ? nodal_strain_.get() : nullptr);

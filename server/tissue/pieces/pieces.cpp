@@ -40,6 +40,7 @@ Pieces::Pieces(const organ::Organ& organ) : gravity_(organ.gravity_m_s2) {
 void Pieces::read_state(const topology::Topology& topology, world::World& world) {
   list_.find(topology, world);
   world.still_ticks.resize(list_.size() + 1);
+  world.calm_ticks.resize(list_.size() + 1);
   find_manners(world);
 }
 
@@ -69,20 +70,22 @@ void Pieces::update(const topology::Edit& edit, world::World& world) {
   // Pieces that stay keep their lowest node.
   struct Kept {
     NodeIndex lowest;
-    std::uint16_t ticks = 0;
+    std::uint16_t still = 0, calm = 0;
   };
   std::vector<Kept> kept;
   for (const auto node : edit.topology.changed())
-    if (node.value < list_.node_count()) wake(place_at(node), world);
+    if (node.value < list_.node_count()) touch(place_at(node), world);
   for (std::size_t i = 0; i < list_.size(); ++i)
-    kept.push_back({list_[i].nodes.front(), world.still_ticks[i + 1]});
+    kept.push_back({list_[i].nodes.front(), world.still_ticks[i + 1], world.calm_ticks[i + 1]});
   list_.update(edit, world);
   world.still_ticks.resize(list_.size() + 1);
+  world.calm_ticks.resize(list_.size() + 1);
   for (std::size_t i = 0; i < list_.size(); ++i) {
     const auto lowest = list_[i].nodes.front();
     const auto same = std::ranges::lower_bound(kept, lowest, {}, &Kept::lowest);
     const bool is_kept = same != kept.end() && same->lowest == lowest;
-    world.still_ticks[i + 1] = is_kept ? same->ticks : std::uint16_t{0};
+    world.still_ticks[i + 1] = is_kept ? same->still : std::uint16_t{0};
+    world.calm_ticks[i + 1] = is_kept ? same->calm : std::uint16_t{0};
   }
   find_manners(world);
 }
@@ -98,6 +101,11 @@ void Pieces::wake(std::size_t place, world::World& world) {
   changed_.insert(changed_.end(), nodes.begin(), nodes.end());
   manners_[place] = Manner::Awake;
   is_all_asleep_ = false;
+}
+
+void Pieces::touch(std::size_t place, world::World& world) {
+  wake(place, world);
+  world.calm_ticks[place] = 0;
 }
 
 void Pieces::wake(world::World& world) {
@@ -230,17 +238,56 @@ bool Pieces::is_alone(std::size_t place, double slack_m) const {
 }
 
 namespace {
-// A mean alone would let a small flap stop while it moves, and the fastest node alone would wait
-// for one that trembles.
-bool is_body_still(std::span<const NodeIndex> nodes, const world::World& world) {
-  constexpr auto kMost = static_cast<float>(kShape_m_s * kShape_m_s);
-  double sum = 0;
+// Squares of the speeds of a body's nodes, (m/s)^2.
+struct SquaredSpeeds {
+  double mean = 0;
+  float most = 0;
+};
+SquaredSpeeds squared_speeds(std::span<const NodeIndex> nodes, const world::World& world) {
+  SquaredSpeeds speeds;
   for (const auto node : nodes) {
     const float squared = squared_speed(node, world);
-    if (!(squared < kMost)) return false;
-    sum += static_cast<double>(squared);
+    speeds.mean += static_cast<double>(squared);
+    speeds.most = std::max(speeds.most, squared);
   }
-  return sum < kRest_m_s * kRest_m_s * static_cast<double>(nodes.size());
+  speeds.mean /= static_cast<double>(std::max<std::size_t>(nodes.size(), 1));
+  return speeds;
+}
+// A mean alone would let a small flap stop while it moves, and the fastest node alone would wait
+// for one that trembles.
+bool is_still(const SquaredSpeeds& speeds) {
+  return static_cast<double>(speeds.most) < kShape_m_s * kShape_m_s &&
+         speeds.mean < kRest_m_s * kRest_m_s;
+}
+}  // namespace
+
+namespace {
+// Nodes that tremble about their places have speeds, but go nowhere: that is seen in the last two
+// poses of the far field. What creeps goes the same way from the first to the second and from the
+// second to now.
+bool goes_nowhere(std::span<const NodeIndex> nodes, const world::World& world) {
+  const auto& poses = world.far_poses;
+  if (poses.age() + 1 < world::FarPoses::kInterval) return false;
+  constexpr double kInterval_s = kDt_s * world::FarPoses::kInterval;
+  constexpr double kMost_m = kShape_m_s * kInterval_s, kCreep_m = kRest_m_s * kInterval_s;
+  const auto newest = poses.pose(poses.newest()), before = poses.pose(poses.newest() - 1);
+  double creep = 0, first_sum = 0, second_sum = 0;
+  for (const auto node : nodes) {
+    const Vec3d middle = to_double(world::displacement_of(newest[node.value]));
+    const Vec3d first = middle - to_double(world::displacement_of(before[node.value])),
+                second = to_double(world.displacements[node.value]) - middle;
+    const double first_squared = length_squared(first), second_squared = length_squared(second),
+                 same_way = dot(first, second);
+    if (!(std::max(first_squared, second_squared) < kFlutter_m * kFlutter_m &&
+          same_way < kMost_m * kMost_m))
+      return false;
+    first_sum += first_squared;
+    second_sum += second_squared;
+    creep += same_way;
+  }
+  const auto count = static_cast<double>(nodes.size());
+  return std::max(first_sum, second_sum) < kTremble_m * kTremble_m * count &&
+         creep < kCreep_m * kCreep_m * count;
 }
 }  // namespace
 
@@ -248,23 +295,32 @@ void Pieces::look_for_rest(std::size_t place, world::World& world) {
   const auto nodes = nodes_at(place);
   const auto& load = loads_[place];
   auto& ticks = world.still_ticks[place];
+  auto& calm = world.calm_ticks[place];
   if (load.is_touched) {
-    ticks = 0;
+    ticks = calm = 0;
+    return;
+  }
+  const auto speeds = squared_speeds(nodes, world);
+  const bool is_carried_by = place == 0 || load.is_pressed || !(length_squared(gravity_) > 0);
+  calm = speeds.mean < kCalm_m_s * kCalm_m_s
+             ? static_cast<std::uint16_t>(std::min(calm + 1, int{kCalmTicks}))
+             : std::uint16_t{0};
+  const bool has_wounds = !world.origins.empty();
+  if (calm == kCalmTicks && has_wounds && is_carried_by && goes_nowhere(nodes, world)) {
+    lay_down(place, world);
     return;
   }
   if (place == 0) {
-    const bool is_still = is_body_still(nodes, world);
-    ticks = is_still ? static_cast<std::uint16_t>(ticks + 1) : std::uint16_t{0};
+    ticks = is_still(speeds) ? static_cast<std::uint16_t>(ticks + 1) : std::uint16_t{0};
     if (ticks >= kRestTicks) lay_down(place, world);
     return;
   }
   const auto motion = motion_of(nodes, world);
-  const bool is_still = fastest_within(nodes, motion, world) < kShape_m_s;
-  ticks = is_still ? static_cast<std::uint16_t>(std::min(ticks + 1, int{kRestTicks}))
-                   : std::uint16_t{0};
+  ticks = fastest_within(nodes, motion, world) < kShape_m_s
+              ? static_cast<std::uint16_t>(std::min(ticks + 1, int{kRestTicks}))
+              : std::uint16_t{0};
   if (ticks < kRestTicks) return;
   const double speed = length(motion.velocity) + length(motion.turning()) * motion.radius;
-  const bool is_carried_by = load.is_pressed || !(length_squared(gravity_) > 0);
   if (is_carried_by && speed < kShape_m_s) {
     lay_down(place, world);
     return;

@@ -16,7 +16,8 @@
 // where it has gone kFarthest_m.
 //
 // Work per tick: O(nodes of what is awake or flies), and O(surface) while something flies.
-// Everything follows from the state: classes, velocities and World::still_ticks.
+// Everything follows from the state: classes, velocities, poses of the far field,
+// World::still_ticks and World::calm_ticks.
 
 #include <span>
 #include <vector>
@@ -36,6 +37,12 @@ inline constexpr double kRest_m_s = 1e-5;
 inline constexpr float kWakes_m_s = 1e-4f;
 // The shape of a free piece is at rest when its nodes move slower than this against the whole.
 inline constexpr double kShape_m_s = 5e-4;
+// Calm tissue is untouched, with a mean square of speeds below that of kCalm_m_s. What was cut, and
+// was calm for so long, is at rest, too, while it trembles about its place: from one pose of the
+// far field to the next by kTremble_m (root mean square) and nowhere by kFlutter_m. It must not
+// creep: on the whole by kRest_m_s, and no node by kShape_m_s.
+inline constexpr std::uint16_t kCalmTicks = 2 * world::FarPoses::kInterval;
+inline constexpr double kCalm_m_s = 1e-3, kTremble_m = 1e-5, kFlutter_m = 2e-4;
 inline constexpr double kFloor_m = 0.3, kFarthest_m = 0.9;
 
 class Pieces {
@@ -90,6 +97,8 @@ class Pieces {
   void find_manners(const world::World& world);
   void note_sleepers();
   void wake(std::size_t place, world::World& world);
+  // Wakes, for a tool or an edit.
+  void touch(std::size_t place, world::World& world);
   void lay_down(std::size_t place, world::World& world);
   void add_loads(const contact::ContactList& contacts, const world::World& world);
   void add_load(const contact::ContactPoint& point, bool is_tool, const world::World& world);

@@ -117,6 +117,16 @@ LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::Prop
   return layer_nodes;
 }
 
+// Tets along wounds are small and stiff: what moves there without a tool comes to rest under more
+// sweeps than the uncut mesh needs.
+constexpr std::uint32_t kRestSweeps = 4;
+
+void sweep_until_rest(dynamics::SolveSettings& settings) {
+  settings.sweeps = std::max(settings.sweeps, kRestSweeps);
+  settings.far_sweeps = std::max(settings.far_sweeps, kRestSweeps);
+  settings.bands = {};
+}
+
 // The solver is told this for one step of time. far: it moves what is not swept; null: sweeps do.
 dynamics::SolveSettings settings_of(const TickDecisions& decisions, const SolveWork& work,
                                     dynamics::FarFieldSolver* far) {
@@ -180,9 +190,9 @@ bool is_reduction_off(const TickDecisions& decisions, const ExternalLoads* loads
 
 // far_model: null: sweeps alone move the tissue. Active nodes that have come to rest are let go.
 SolveReport solve(const contact::ContactList& contacts, const propagation::PropagationQueue& queue,
-                  const TickDecisions& decisions, ExternalLoads* loads, world::World& world,
-                  dynamics::FarFieldModel* far_model, propagation::ActiveSet& active,
-                  SolveWork& work) {
+                  const TickDecisions& decisions, bool may_rest, ExternalLoads* loads,
+                  world::World& world, dynamics::FarFieldModel* far_model,
+                  propagation::ActiveSet& active, SolveWork& work) {
   auto nodes = active.nodes();
   std::optional<dynamics::FarFieldModel::Choice> modelled;
   if (far_model != nullptr)
@@ -191,9 +201,12 @@ SolveReport solve(const contact::ContactList& contacts, const propagation::Propa
                           work.solver, world);
   if (modelled) nodes = modelled->near;
   const auto layer_nodes = find_bands(nodes, queue, decisions, work.bands);
-  auto report =
-      solve_steps(contacts, nodes, settings_of(decisions, work, modelled ? modelled->far : nullptr),
-                  decisions.policy.steps_per_tick, loads, world, work.solver);
+  auto settings = settings_of(decisions, work, modelled ? modelled->far : nullptr);
+  const bool has_untouched_wounds = contacts.tools.empty() && !world.origins.empty();
+  if (may_rest && has_untouched_wounds && !(settings.residual_tolerance_n > 0))
+    sweep_until_rest(settings);
+  auto report = solve_steps(contacts, nodes, settings, decisions.policy.steps_per_tick, loads,
+                            world, work.solver);
   const auto settled =
       active.settle(queue, work.solver.residuals_n(), decisions.linger_ticks, world);
   work.solver.read_state(world, settled);
@@ -265,7 +278,7 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
   work.solver.use_energies(may_rest ? pieces.turning() : std::span<const NodeIndex>{});
   work.solver.let_spring(may_rest ? pieces.free() : std::span<const NodeIndex>{});
   if (!is_asleep)
-    report = solve(contacts, context.near.queue, decisions, loads, state.world,
+    report = solve(contacts, context.near.queue, decisions, may_rest, loads, state.world,
                    state.far_model.get(), context.near.active, work);
   pieces::Pieces::Motion motion;
   if (may_rest) {
@@ -278,12 +291,13 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
 }
 
 // An edit of the topology goes to all of the state, and to the work that follows from it.
-blades::CutReport cut_tissue(State& state, CutWork& cut, ContactWork& contact, NearWork& near,
-                             SolveWork& solve) {
+blades::CutReport cut_tissue(std::uint32_t waiting_blades, State& state, CutWork& cut,
+                             ContactWork& contact, NearWork& near, SolveWork& solve) {
   auto& cuts = state.cuts;
   find_tears(near.active.nodes(), state.grasps, solve.pieces.list(), state.world, cuts, cut);
   blades::CutReport report;
-  const auto edit = cuts.cut(state.tools, state.claims, state.world, cut.travel_m, report);
+  const auto edit =
+      cuts.cut({state.tools, state.claims, waiting_blades}, state.world, cut.travel_m, report);
   if (edit) {
     hand_out(*edit, state, contact, near, solve);
     cuts.end_edit();
@@ -399,7 +413,8 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   end(Stage::Solve);
   state.proxies.update(contacts, world, state.tools);
   end(Stage::Contacts);
-  report.cut = cut_tissue(state, context.cut, context.contact, context.near, context.solve);
+  report.cut = cut_tissue(decisions.waiting_blades, state, context.cut, context.contact,
+                          context.near, context.solve);
   end(Stage::Cut);
   contact::update_claims(world, state.tools, contacts, context.contact.requests, state.claims,
                          state.grasps, context.outbox.claim_events);

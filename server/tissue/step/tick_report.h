@@ -54,6 +54,9 @@ struct TickDecisions {
 
   bool is_reduction_off = false;  // the full solver, whatever a session's reduction has
 
+  // Bits of tools: their blades wait where they are, and the hands feel it (blades/blades.h).
+  std::uint32_t waiting_blades = 0;
+
   TickPolicy policy;
 
   bool operator==(const TickDecisions&) const = default;

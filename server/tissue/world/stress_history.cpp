@@ -16,6 +16,7 @@ void StressHistory::extend(std::size_t places) {
   if (blocks <= before) return;
   values_.resize(blocks * block_size());
   advanced_in_.resize(blocks * kPlaces, step_);
+  last_spans_.resize(blocks * kPlaces);
   hashes_.resize(blocks);
   for (auto i = before; i < blocks; ++i) hash_ += rehash(i);
 }
@@ -27,7 +28,15 @@ StressHistory::Steps StressHistory::age(std::size_t index) const {
   return age;
 }
 
+StressHistory::Steps StressHistory::last_span(std::size_t index) const {
+  Steps spans;
+  std::copy_n(last_spans_.begin() + static_cast<std::ptrdiff_t>(index * kPlaces), kPlaces,
+              spans.begin());
+  return spans;
+}
+
 std::uint64_t StressHistory::advanced(std::size_t index) {
+  std::ranges::copy(age(index), last_spans_.begin() + static_cast<std::ptrdiff_t>(index * kPlaces));
   std::fill_n(advanced_in_.begin() + static_cast<std::ptrdiff_t>(index * kPlaces), kPlaces, step_);
   return rehash(index);
 }
@@ -37,8 +46,9 @@ std::uint64_t StressHistory::hash_of(std::size_t block) const {
   const auto of_values =
       xxh3_64({reinterpret_cast<const std::uint8_t*>(values.data()), values.size_bytes()});
   const auto of_steps = xxh3_64(BytesView(advanced_in_).subspan(block * kPlaces, kPlaces));
+  const auto of_spans = xxh3_64(BytesView(last_spans_).subspan(block * kPlaces, kPlaces));
   // Odd factors: which block has which values counts.
-  return of_values * (2 * block + 1) + of_steps * (2 * block + 3);
+  return of_values * (2 * block + 1) + of_steps * (2 * block + 3) + of_spans * (2 * block + 5);
 }
 
 std::uint64_t StressHistory::rehash(std::size_t block) {
@@ -54,6 +64,7 @@ void StressHistory::inherit(std::size_t child, std::size_t parent) {
   for (std::size_t i = 0; i < tensors_ * kComponents; ++i)
     values_[place(child) + i * kPlaces] = values_[place(parent) + i * kPlaces];
   advanced_in_[child] = advanced_in_[parent];
+  last_spans_[child] = last_spans_[parent];
   hash_ += rehash(child / kPlaces);
 }
 
@@ -66,6 +77,7 @@ void StressHistory::visit_hash(StateArchive& archive) {
 void StressHistory::visit_values(StateArchive& archive) {
   if (is_empty()) return;
   archive.fixed_array(advanced_in_);
+  archive.fixed_array(last_spans_);
   archive.fixed_array(values_);
   if (!archive.is_reading()) return;
   std::uint64_t sum = 0;

@@ -35,6 +35,8 @@ class StressHistory {
   }
   // Steps since each of its places was advanced.
   Steps age(std::size_t index) const;
+  // Steps over which each of its places was advanced last; 0: it never was.
+  Steps last_span(std::size_t index) const;
 
   // Counts a step.
   void begin_step() { ++step_; }
@@ -65,6 +67,7 @@ class StressHistory {
   std::size_t tensors_ = 0;  // per place
   std::vector<float> values_;
   std::vector<std::uint8_t> advanced_in_;  // per place: step()
+  std::vector<std::uint8_t> last_spans_;   // per place
   std::uint8_t step_ = 0;
   std::vector<std::uint64_t> hashes_;  // per block
   std::uint64_t hash_ = 0;             // their sum

@@ -14,7 +14,8 @@ World::World(const organ::Organ& organ)
       quiet_ticks(organ.mesh.node_count()),
       far_poses(organ.mesh.node_count()),
       relaxation(organ),
-      still_ticks(1) {
+      still_ticks(1),
+      calm_ticks(1) {
   const auto& mesh = organ.mesh;
   rest_positions.reserve(mesh.node_count());
   masses.reserve(mesh.node_count());
@@ -96,6 +97,7 @@ void World::visit_state(StateArchive& archive) {
   far_poses.visit_state(archive);
   relaxation.visit_state(archive);
   archive.sized_array(still_ticks, static_cast<std::uint32_t>(node_count() + 1));
+  archive.sized_array(calm_ticks, static_cast<std::uint32_t>(node_count() + 1));
   if (!archive.is_reading()) return;
   if (boundary > Boundary::Whole) archive.fail();
   for (std::size_t i = 0; i < node_count(); ++i)

@@ -1,11 +1,11 @@
 #include "server/web/bridge/carrier.h"
 
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 
 #include "common/base/log.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
 #include "server/web/bridge/page_messages.h"
@@ -37,8 +37,8 @@ void Carrier::start() {
 
 void Carrier::spawn(asio::awaitable<void> work) {
   const auto self = shared_from_this();
-  asio::co_spawn(executor_, std::move(work),
-                 [self](std::exception_ptr failure) { rethrow(failure); });
+  trocar::spawn(executor_, std::move(work),
+                [self](std::exception_ptr failure) { rethrow(failure); });
 }
 
 // Coroutines here hold no temporaries across a co_await: GCC 12 miscompiles some of them otherwise.

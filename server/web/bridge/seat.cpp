@@ -1,8 +1,7 @@
 #include "server/web/bridge/seat.h"
 
-#include <boost/asio/co_spawn.hpp>
-
 #include "common/base/no_throw.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
 #include "server/web/bridge/carrier.h"
@@ -52,7 +51,7 @@ asio::awaitable<void> Seat::run(const SessionAddress& session) {
     ++bridge_.counters.joins;
     is_up_running_ = true;
     const auto self = shared_from_this();
-    asio::co_spawn(browser_.executor(), read_up(), [self](std::exception_ptr failure) {
+    spawn(browser_.executor(), read_up(), [self](std::exception_ptr failure) {
       self->is_up_running_ = false;
       self->up_ended_.cancel();
       rethrow(failure);

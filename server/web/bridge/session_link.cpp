@@ -1,7 +1,6 @@
 #include "server/web/bridge/session_link.h"
 
 #include <array>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <memory>

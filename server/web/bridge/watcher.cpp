@@ -1,11 +1,11 @@
 #include "server/web/bridge/watcher.h"
 
-#include <boost/asio/co_spawn.hpp>
 #include <cstring>
 
 #include "common/base/log.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
 #include "server/web/bridge/page_messages.h"
@@ -106,7 +106,7 @@ asio::awaitable<void> Watcher::watch_alone(const SessionAddress& session) {
   ++bridge_.counters.joins;
   is_up_running_ = true;
   const auto self = shared_from_this();
-  asio::co_spawn(browser_->executor(), relay_up(), [self](std::exception_ptr failure) {
+  spawn(browser_->executor(), relay_up(), [self](std::exception_ptr failure) {
     self->is_up_running_ = false;
     self->up_ended_.cancel();
     rethrow(failure);

@@ -127,7 +127,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       <aside>
         {stage.current && <LessonPanel goal={{ stage: stage.current, progress: progress.current, seconds: progress.current?.seconds ?? 0 }} {...(mayMark ? { lead } : {})} />}
         <BloodPanel blood={replica.blood()} />
-        <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows}
+        <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} waits={slot => replica.waits(slot)}
           {...(mayMark ? { extra: person => <Manage session={session} person={person} people={people.current} own={own.current} onAsk={setAsks} /> } : {})} />
         {mayMark && <Door session={session} list={list.current} />}
         <section aria-labelledby="forces">

@@ -12,14 +12,14 @@ import { clock, doing, forceOf, newtons } from './stage';
 const kRoles: Record<number, string> = { [Role.SURGEON]: 'surgeon', [Role.ASSISTANT]: 'assistant', [Role.INSTRUCTOR]: 'instructor', [Role.OBSERVER]: 'observer' };
 export const hex = (colour: number): string => `#${colour.toString(16).padStart(6, '0')}`;
 
-export function People(props: { people: Participant[]; tools: Tool[]; own: number | null; colourOf(slot: number): number; follows: number | null; onFollow(slot: number | null): void; extra?: (person: Participant) => ComponentChildren }): JSX.Element {
+export function People(props: { people: Participant[]; tools: Tool[]; own: number | null; colourOf(slot: number): number; follows: number | null; onFollow(slot: number | null): void; waits?(slot: number): boolean; extra?: (person: Participant) => ComponentChildren }): JSX.Element {
   return (
     <section aria-labelledby="people">
       <h2 id="people">People <small>{props.people.length}</small></h2>
       <ul class="people">
         {props.people.map(p => {
           const tools = props.tools.filter(t => t.slot >> 1 === p.slot), newton = tools.reduce((sum, t) => sum + forceOf(t), 0);
-          const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : p.frozenBy !== '' ? `held still by ${p.frozenBy}` : p.lentTools !== 0 ? 'was handed an instrument' : has ? doing(tools, p.tool) : 'watches';
+          const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : p.frozenBy !== '' ? `held still by ${p.frozenBy}` : p.lentTools !== 0 ? 'was handed an instrument' : has && props.waits?.(p.slot) ? 'is kept waiting: cuts too fast' : has ? doing(tools, p.tool) : 'watches';
           return (
             <li key={p.slot} class={p.isAway ? 'away' : ''}>
               <span class={has ? 'dot' : 'dot none'} ref={el => el?.style.setProperty('--own', hex(props.colourOf(p.slot)))} aria-hidden="true" />

@@ -51,6 +51,7 @@ interface Exports {
   fine_picture_at(): number;
   fine_picture_bytes(): number;
   blood(): number;
+  waiting_blades(): number;
   tools(): number;
   tools_at(): number;
   pointers(): number;
@@ -233,6 +234,9 @@ export class Replica {
       });
     return out;
   }
+
+  // Whether a blade of this participant is kept waiting, or was a moment ago.
+  waits(participant: number): boolean { return (this.e.waiting_blades() >>> (2 * participant) & 3) !== 0; }
 
   // Says how much has bled so far; null: the session does not bleed.
   blood(): Blood | null {
