@@ -9,11 +9,11 @@
 namespace trocar::embedding {
 namespace {
 
-constexpr float kAtCorner = 1e-4f;         // shares of a fine triangle: as good as none
-constexpr float kOnEdge = 1e-3f;           // likewise, of a face
-constexpr float kSkirtShare = 0.12f;       // of the edge of a rim: so far a skirt reaches below it
-constexpr float kLeastFacing = 0.1f;       // cosine of a face that lies under a triangle
-constexpr float kUnderSlackCells = 0.25f;  // a coarse face so near is under a fine triangle
+constexpr float kAtCorner = 1e-4f;        // shares of a fine triangle: as good as none
+constexpr float kOnEdge = 1e-3f;          // likewise, of a face
+constexpr float kSkirtShare = 0.12f;      // of the edge of a rim: so far a skirt reaches below it
+constexpr float kLeastFacing = 0.1f;      // cosine of a face that lies under a triangle
+constexpr float kUnderSlackEdges = 0.5f;  // mean fine edges: a coarse face so near is under it
 constexpr std::size_t kMostUnder = 256;
 constexpr std::size_t kMostLookedUnder = 16'384;  // cells and faces, for those under a triangle
 
@@ -84,8 +84,9 @@ bool EmbeddedSurface::EdgeSet::has(std::uint32_t a, std::uint32_t b) const {
 
 EmbeddedSurface::EmbeddedSurface(FineShape shape) : shape_(std::move(shape)) {
   shape_normals_ = normals_of(shape_);
-  shape_grid_.build(shape_.positions, shape_.triangles,
-                    2 * mean_edge(shape_.positions, shape_.triangles));
+  const float edge_m = mean_edge(shape_.positions, shape_.triangles);
+  under_slack_m_ = kUnderSlackEdges * edge_m;
+  shape_grid_.build(shape_.positions, shape_.triangles, 2 * edge_m);
   face_of_.assign(shape_.positions.size(), kNoFace);
   is_affected_.assign(shape_.triangles.size(), 0);
   is_parted_.assign(shape_.triangles.size(), 0);
@@ -108,28 +109,25 @@ void EmbeddedSurface::note_changes(const CoarseShape& coarse) {
   is_all_new_ = coarse_.empty() || coarse.rest.size() < rest_.size() ||
                 coarse.triangles.size() < coarse_.size() ||
                 !std::equal(rest_.begin(), rest_.end(), coarse.rest.begin());
-  gone_.clear();
   changed_boxes_.clear();
-  const auto is_outer = [&](std::size_t i) {
-    return coarse.triangles[i][0] != coarse.triangles[i][1] &&
-           (i >= coarse.is_wound.size() || coarse.is_wound[i] == 0);
-  };
-  for (std::size_t i = 0; i < coarse_.size() && !is_all_new_; ++i) {
-    const TriangleCorners now = is_outer(i) ? coarse.triangles[i] : TriangleCorners{};
-    if (coarse_[i] == now || coarse_[i][0] == coarse_[i][1]) continue;
-    gone_.push_back(static_cast<std::uint32_t>(i));
-    Box<float>& box = changed_boxes_.emplace_back();
-    for (const std::uint32_t v : coarse_[i]) box.include(rest_[v]);
-  }
   rest_.assign(coarse.rest.begin(), coarse.rest.end());
   coarse_.resize(coarse.triangles.size());
   faces_.clear();
-  for (std::size_t i = 0; i < coarse_.size(); ++i) {
-    coarse_[i] = is_outer(i) ? coarse.triangles[i] : TriangleCorners{};
-    if (is_outer(i)) faces_.push_back(static_cast<std::uint32_t>(i));
+  const auto add_changed = [this](const TriangleCorners& face) {
+    if (face[0] == face[1]) return;
+    Box<float>& box = changed_boxes_.emplace_back();
+    for (const std::uint32_t v : face) box.include(rest_[v]);
+  };
+  for (std::uint32_t i = 0; i < coarse_.size(); ++i) {
+    const TriangleCorners& now = coarse.triangles[i];
+    const bool is_outer =
+        now[0] != now[1] && (i >= coarse.is_wound.size() || coarse.is_wound[i] == 0);
+    const TriangleCorners before = std::exchange(coarse_[i], is_outer ? now : TriangleCorners{});
+    if (is_outer) faces_.push_back(i);
+    if (is_all_new_ || coarse_[i] == before) continue;
+    add_changed(before);
+    add_changed(coarse_[i]);
   }
-  is_gone_.assign(coarse_.size(), 0);
-  for (const std::uint32_t face : gone_) is_gone_[face] = 1;
 }
 
 void EmbeddedSurface::add_affected(std::uint32_t triangle) {
@@ -143,8 +141,7 @@ void EmbeddedSurface::find_affected() {
     return;
   }
   for (Box<float> box : changed_boxes_) {
-    box.grow(farthest_m_ + kUnderSlackCells * grid_.cell_m() +
-             2 * static_cast<float>(kRimSlackMetres));
+    box.grow(farthest_m_ + under_slack_m_ + 2 * static_cast<float>(kRimSlackMetres));
     found_.clear();
     shape_grid_.find(box, found_);
     for (const std::uint32_t t : found_) add_affected(t);
@@ -206,13 +203,14 @@ void EmbeddedSurface::follow(const CoarseShape& coarse) {
     for (std::size_t k = 0; k < 3; ++k) edges_.insert(coarse_[face][k], coarse_[face][(k + 1) % 3]);
   frames_.build(rest_, coarse_, faces_);
   find_affected();
-  if (is_all_new_) {
-    farthest_m_ = 0;
-    std::fill(face_of_.begin(), face_of_.end(), kNoFace);
-  }
+  if (is_all_new_) farthest_m_ = 0;
+  // One that still has its face is bound anew, too: a new face may be as near, and who joins late
+  // knows nothing of the old ones.
+  for (const std::uint32_t t : affected_)
+    for (const std::uint32_t v : shape_.triangles[t]) face_of_[v] = kNoFace;
   for (const std::uint32_t t : affected_)
     for (const std::uint32_t v : shape_.triangles[t])
-      if (face_of_[v] == kNoFace || is_gone_[face_of_[v]] != 0) bind(v);
+      if (face_of_[v] == kNoFace) bind(v);
   keep_unaffected();
   for (const std::uint32_t t : affected_) settle(t);
   for (const std::uint32_t t : affected_) is_affected_[t] = 0;
@@ -230,7 +228,7 @@ void EmbeddedSurface::find_faces_under(std::uint32_t triangle, const Vec3f& char
   Box<float> box;
   for (const std::uint32_t v : shape_.triangles[triangle])
     box.include(shape_.positions[v] - vertices_[v].offset);
-  box.grow(kUnderSlackCells * grid_.cell_m() + static_cast<float>(kRimSlackMetres));
+  box.grow(under_slack_m_ + static_cast<float>(kRimSlackMetres));
   found_.clear();
   grid_.find(box, found_, kMostLookedUnder);
   // In one order, so that who joins late gets the same parts.

@@ -149,6 +149,7 @@ class EmbeddedSurface {
   FaceGrid shape_grid_;
   std::vector<std::uint32_t> face_of_;  // per fine vertex: the coarse triangle it rides on
   float farthest_m_ = 0;
+  float under_slack_m_ = 0;  // the same whatever was cut
 
   // This is the coarse surface at rest.
   std::vector<Vec3f> rest_;
@@ -160,9 +161,7 @@ class EmbeddedSurface {
 
   // While it follows.
   bool is_all_new_ = true;
-  std::vector<std::uint32_t> gone_;
   std::vector<Box<float>> changed_boxes_;
-  std::vector<std::uint8_t> is_gone_;      // per coarse triangle
   std::vector<std::uint8_t> is_affected_;  // per fine triangle
   std::vector<std::uint32_t> affected_, found_, under_;
   std::vector<FaceUnder> faces_under_;
