@@ -60,15 +60,14 @@ Status parse_overlays(const std::vector<std::string>& names, Overlays& overlays)
   const std::map<std::string, bool Overlays::*> known = {{"regions", &Overlays::regions},
                                                          {"holds", &Overlays::holds},
                                                          {"arrows", &Overlays::arrows},
-                                                         {"rate", &Overlays::rate},
-                                                         {"ghost", &Overlays::ghost}};
+                                                         {"rate", &Overlays::rate}};
   for (const std::string& name : names) {
     if (name == "nothing" && names.size() == 1) continue;
     const auto found = known.find(name);
     if (found == known.end())
-      return Error{ErrorCode::Usage,
-                   "--show: '" + name +
-                       "' is not one of regions, holds, arrows, rate, ghost (or nothing, alone)"};
+      return Error{
+          ErrorCode::Usage,
+          "--show: '" + name + "' is not one of regions, holds, arrows, rate (or nothing, alone)"};
     overlays.*found->second = true;
   }
   return {};
@@ -276,8 +275,8 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
       ->check(from_to(1, 240));
   app.add_option(
          "--show", more.overlays,
-         "what is drawn over the picture: regions, holds, arrows, rate, ghost, or nothing; keys "
-         "change it [regions,arrows]")
+         "what is drawn over the picture: regions, holds, arrows, rate, or nothing; keys change "
+         "it [regions,arrows]")
       ->type_name("A,B")
       ->delimiter(',');
   app.add_option("--view", more.view, "turn the camera at first, degrees, and go nearer [0,0,1]")

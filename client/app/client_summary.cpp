@@ -101,8 +101,6 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"change_mismatches", counters.change_mismatches},
                   {"healed", counters.healed},
                   {"deltas_ignored", counters.deltas_ignored},
-                  {"ghosts", counters.ghosts},
-                  {"ghosts_ignored", counters.ghosts_ignored},
                   {"bytes_received", counters.bytes},
                   {"bytes_sent", source.bytes_sent},
                   {"delta_payload_bytes", counters.delta_bytes},

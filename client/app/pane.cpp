@@ -131,13 +131,6 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
     scene_.positions = surface_.positions();
     scene_.regions = surface_.regions();
     scene_.blood = surface_.blood();
-    const auto& ghost = replica.ghost();
-    ghost_.clear();
-    if (look.overlays.ghost && ghost.epoch == replica.topology().epoch &&
-        ghost.offsets.size() == scene_.positions.size())
-      for (std::size_t i = 0; i < scene_.positions.size(); ++i)
-        ghost_.push_back(scene_.positions[i] + ghost.offsets[i]);
-    scene_.ghost_positions = ghost_;
     scene_.holds = holds(replica, look.overlays.holds);
     for (const replica::Tool& tool : surface_.tools())
       scene_.tools.push_back(scene_tool(replica, tool, hands));

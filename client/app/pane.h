@@ -87,7 +87,6 @@ class Pane {
   std::uint64_t now_ns_ = 0;
   LentView lent_;
   std::string sees_with_;
-  std::vector<Vec3f> ghost_;  // where the full solution has the vertices of the last picture
   replica::DrawnLines lines_;
   shape::MeshVertices drawing_;  // of the last picture
   replica::HeldTissue held_;

@@ -9,7 +9,6 @@
 #include "client/ui/away_text.h"
 #include "client/ui/banner_text.h"
 #include "client/ui/rate_text.h"
-#include "client/ui/solver_text.h"
 #include "common/base/log.h"
 
 namespace trocar::app {
@@ -279,7 +278,6 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_holds = overlays_.holds;
   model.shows_arrows = overlays_.arrows;
   model.shows_rate = overlays_.rate;
-  if (overlays_.ghost) model.ghost_text = ui::describe(replica.ghost(), is_replay);
   add_lent_view(replica, is_replay, model);
   model.greatest_force_n = pane_.forces().greatest();
   model.participants = participants_of(replica, pane_, is_replay);
@@ -312,7 +310,6 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_holds) overlays_.holds = !overlays_.holds;
   if (actions.toggle_arrows) overlays_.arrows = !overlays_.arrows;
   if (actions.toggle_rate) overlays_.rate = !overlays_.rate;
-  if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) pane_.frame_camera(replica, view_);
   if (actions.screenshot) wants_screenshot_ = true;
   if (actions.toggle_measure || (actions.end_measure && is_measuring_)) toggle_measure();
@@ -386,11 +383,6 @@ void Picture::add_lent_view(const replica::Replica& replica, bool is_replay,
                         : "You see from behind the tool of " + name + ": T goes on.";
 }
 
-void Picture::ask_for_ghost(replica::SessionSource& source) {
-  if (source.playback() != nullptr || overlays_.ghost == has_asked_for_ghost_) return;
-  if (replica::ask_for_ghost(source, overlays_.ghost)) has_asked_for_ghost_ = overlays_.ghost;
-}
-
 void Picture::draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
                    std::uint64_t now_ns) {
   const float seconds =
@@ -408,7 +400,6 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
     shows_help_ = false;
     help_until_ns_ = 0;
   }
-  ask_for_ghost(source);
   context_->poll_events();
   hud_.begin_frame(seconds);
   device::PointerInput input = hud_.input();

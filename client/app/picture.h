@@ -77,7 +77,6 @@ class Picture {
   void leave_lent_views();
   ui::HudHalf half(std::size_t number, const Pane& pane, const replica::Replica& replica) const;
   void add_halves(const replica::Replica& replica, ui::HudModel& model) const;
-  void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
 
@@ -103,7 +102,6 @@ class Picture {
   bool shows_help_ = false, wants_screenshot_ = false;
   Overlays overlays_;
   StartView view_;
-  bool has_asked_for_ghost_ = false;
   bool is_measuring_ = false, was_left_ = false;
   // Keeps what each device has rendered and what the server said, N.
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;

@@ -7,7 +7,6 @@
 
 #include "client/render/field_source.h"
 #include "client/render/fine_layer.h"
-#include "client/render/ghost_net.h"
 #include "client/render/gl.h"
 #include "client/render/organ_vertex.h"
 #include "client/render/shader.h"
@@ -138,7 +137,6 @@ struct SceneRenderer::Parts {
   Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
   Shader field{kFieldVertexSource, lit(kPlainHead, kFieldFragmentSource).c_str()};
   Shader scope_mask{kFieldVertexSource, kScopeMaskSource};
-  GhostNet ghost_net;
   FineLayer fine;
   VertexArray organ_array, tool_array, field_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
@@ -512,9 +510,6 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
   glEnable(GL_MULTISAMPLE);
   glEnable(GL_DEPTH_TEST);
   parts.draw_organ(scene, camera, is_sharp ? parts.fine_organ : parts.plain_organ);
-  if (!scene.ghost_positions.empty())
-    parts.ghost_net.draw(scene.positions, scene.ghost_positions, scene.triangles,
-                         camera.clip_from_world(parts.size), camera.rays(parts.size).eye);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
   if (camera.lens() && camera.lens()->is_endoscope) parts.draw_scope_mask();

@@ -61,7 +61,6 @@ struct SceneView {
   std::span<const std::uint16_t> regions;  // per vertex; may be empty
   std::span<const float> blood;            // per vertex: levels (wire/blood_codec.h); may be empty
   std::vector<Hold> holds;                 // per vertex; empty: not shown
-  std::span<const Vec3f> ghost_positions;  // of another solution, as many; empty: none
   bool shows_regions = true, shows_arrows = true;
   std::vector<SceneTool> tools;
   std::vector<ScenePointer> pointers;

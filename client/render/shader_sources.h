@@ -240,29 +240,4 @@ void main() {
 }
 )";
 
-inline constexpr const char* kGhostVertexSource = R"(#version 330 core
-layout(location = 0) in vec3 position;
-layout(location = 1) in float apart;  // m, from the tissue
-uniform mat4 clip_from_world;
-uniform vec3 eye;
-out float distance_mm;
-void main() {
-  distance_mm = 1e3 * apart;
-  // A little in front of the tissue, which is drawn rounder than its triangles.
-  vec3 towards = normalize(eye - position);
-  gl_Position = clip_from_world * vec4(position + 0.0008 * towards, 1.0);
-}
-)";
-
-inline constexpr const char* kGhostFragmentSource = R"(#version 330 core
-in float distance_mm;
-out vec4 colour;
-uniform float strength;
-void main() {
-  vec3 same = vec3(0.35, 0.80, 1.0), apart = vec3(1.0, 0.85, 0.25), far = vec3(1.0, 0.25, 0.45);
-  vec3 c = mix(same, apart, clamp(distance_mm / 0.25, 0.0, 1.0));
-  colour = vec4(mix(c, far, clamp((distance_mm - 0.25) / 0.75, 0.0, 1.0)), strength);
-}
-)";
-
 }  // namespace trocar::render

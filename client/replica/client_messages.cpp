@@ -101,10 +101,4 @@ bool send_view(SessionSource& source, const Vec3f& eye_m, const Vec3f& target_m)
   return source.send(envelope);
 }
 
-bool ask_for_ghost(SessionSource& source, bool is_wanted) {
-  proto::Envelope envelope;
-  envelope.mutable_ghost_request()->set_is_wanted(is_wanted);
-  return source.send(envelope);
-}
-
 }  // namespace trocar::replica

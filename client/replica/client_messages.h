@@ -56,8 +56,5 @@ enum class LessonWish : std::uint8_t { Answer = 1, Next = 2, Restart = 3 };
 bool send_lesson_wish(SessionSource& source, LessonWish wish, std::uint32_t tool = 0);
 // To say where one's own view is, as who has the view to follow. False if the source dropped it.
 bool send_view(SessionSource& source, const Vec3f& eye_m, const Vec3f& target_m);
-// To be shown the full solution beside a session with a reduction, or no longer. False if the
-// source dropped it.
-bool ask_for_ghost(SessionSource& source, bool is_wanted);
 
 }  // namespace trocar::replica

@@ -1,7 +1,6 @@
 #include "client/replica/replica.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/log.h"
 #include "common/base/version.h"
@@ -98,8 +97,6 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_claim(message.claim_event(), arrival_ns);
     case proto::Envelope::kMarkEvent:
       return apply_mark(message.mark_event(), arrival_ns);
-    case proto::Envelope::kGhostFrame:
-      return apply_ghost(message.ghost_frame());
     case proto::Envelope::kRecordingState:
       return apply_recording(message.recording_state());
     case proto::Envelope::kPointEvent:
@@ -148,7 +145,6 @@ void Replica::begin_anew() {
   request_pending_ = false;
   to_show_.clear();
   if (sync_state_ != SyncState::WaitingForTopology) sync_state_ = SyncState::WaitingForKeyframe;
-  ghost_ = {};
   strokes_.clear();
   lesson_strokes_ = 0;
   lesson_.reset();
@@ -534,29 +530,6 @@ void Replica::apply_recording(const proto::RecordingState& message) {
                                : wire::RecordingStatus::Unknown;
   recording_.frames_missing = message.frames_missing();
   recording_.text = message.text().substr(0, kMaxRecordingText);
-}
-
-void Replica::apply_ghost(const proto::GhostFrame& message) {
-  const bool is_known = message.status() >= 0 && message.status() < wire::kGhostStatuses;
-  ghost_.status = is_known ? static_cast<GhostStatus>(message.status()) : GhostStatus::Unknown;
-  ghost_.offsets.clear();
-  if (ghost_.status != GhostStatus::Follows) return;
-  const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
-  const Bytes payload(message.payload().begin(), message.payload().end());
-  ghost_quanta_.assign(layout_.vertex_count(), {});
-  if (message.epoch() != layout_.epoch || !is_sane(message.largest_m()) ||
-      !is_sane(message.root_mean_square_m()) ||
-      !wire::decode_keyframe(payload, ghost_quanta_).ok() ||
-      wire::surface_crc(ghost_quanta_) != message.offsets_crc()) {
-    ++counters_.ghosts_ignored;
-    return;
-  }
-  ++counters_.ghosts;
-  for (const auto& offset : ghost_quanta_) ghost_.offsets.push_back(wire::to_metres(offset));
-  ghost_.epoch = message.epoch();
-  ghost_.largest_m = message.largest_m();
-  ghost_.root_mean_square_m = message.root_mean_square_m();
-  ghost_.behind_ms = message.behind_ms();
 }
 
 const Participant* Replica::find_participant(ParticipantSlot slot) const {

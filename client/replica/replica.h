@@ -44,7 +44,6 @@ class ClaimEvent;
 class Drawing;
 class FineSurfacePart;
 class FrameState;
-class GhostFrame;
 class LessonProgress;
 class LessonStage;
 class MarkEvent;
@@ -90,8 +89,6 @@ struct ReplicaCounters {
   std::uint64_t change_mismatches = 0;  // changes that did not follow, malformed ones included
   std::uint64_t change_bytes = 0;       // of applied changes
   std::uint64_t healed = 0;             // returned to InStep after a mismatch of either kind
-  std::uint64_t ghosts = 0;             // of the full solution, taken
-  std::uint64_t ghosts_ignored = 0;     // of another epoch, or malformed
   std::uint64_t bytes = 0;              // all messages, on the wire
   std::uint64_t delta_bytes = 0;        // payloads of applied deltas
   std::uint64_t changed_vertices = 0;   // by applied deltas
@@ -142,8 +139,6 @@ class Replica final : public MessageSink {
   // Latest last; `notice_count` counts all that ever came.
   const std::deque<Notice>& notices() const { return notices_; }
   std::uint64_t notice_count() const { return notice_count_; }
-  // The full solution, for whoever has asked, is of the surface that is shown if the epochs agree.
-  const Ghost& ghost() const { return ghost_; }
   // Who points where at `now_ns` (monotonic), one entry for each participant.
   std::vector<Pointer> pointers(std::uint64_t now_ns) const;
   // Returns what is drawn on the organ; `drawing_version` changes unless lines were only added.
@@ -193,7 +188,6 @@ class Replica final : public MessageSink {
   void apply_view(const proto::ViewEvent& message, std::uint64_t arrival_ns);
   void tell_all(Tick tick, const std::string& text, bool is_refused, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
-  void apply_ghost(const proto::GhostFrame& message);
   void apply_recording(const proto::RecordingState& message);
   void apply_point(const proto::PointEvent& message, std::uint64_t arrival_ns);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
@@ -243,13 +237,11 @@ class Replica final : public MessageSink {
   bool has_datagrams_ = false;  // frames may come late
   FrameAssembler assembler_;
   std::unique_ptr<proto::FrameState> early_state_;  // its surface is still under way
-  wire::QuantisedSurface ghost_quanta_;
   std::uint32_t surface_crc_ = 0;
   bool request_pending_ = false;  // a KeyframeRequest that could not be queued yet
   std::vector<Participant> participants_;
   std::deque<Notice> notices_;
   std::uint64_t notice_count_ = 0;
-  Ghost ghost_;
   wire::RecordingState recording_;
   std::vector<Pointer> pointers_;  // one of a participant at most
   std::vector<Stroke> strokes_;

@@ -13,14 +13,12 @@
 #include "common/wire/blood_codec.h"
 #include "common/wire/claim_outcome.h"
 #include "common/wire/figures.h"
-#include "common/wire/ghost_status.h"
 #include "common/wire/quantise.h"
 #include "common/wire/role.h"
 
 namespace trocar::replica {
 
 using wire::ClaimOutcome;
-using wire::GhostStatus;
 using wire::has_tools;
 using wire::is_refusal;
 using wire::name_of;
@@ -61,17 +59,6 @@ struct Topology {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint8_t> is_wound;  // per triangle: made by a blade
   std::vector<std::uint32_t> fixed_vertices;
-};
-
-// The server sends these figures of the full solution that it computes beside a session with a
-// reduction.
-struct Ghost {
-  GhostStatus status = GhostStatus::Unknown;
-  // The rest while it follows.
-  std::uint32_t epoch = 0;
-  std::vector<Vec3f> offsets;  // m, per vertex: from the session's surface to the full solution
-  float largest_m = 0, root_mean_square_m = 0;
-  std::uint32_t behind_ms = 0;
 };
 
 // One frame as the server published it.

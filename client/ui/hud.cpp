@@ -225,7 +225,6 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_holds = pressed(GLFW_KEY_L);
   actions.toggle_arrows = pressed(GLFW_KEY_A);
   actions.toggle_rate = pressed(GLFW_KEY_R);
-  actions.toggle_ghost = pressed(GLFW_KEY_G);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
   if (pressed(GLFW_KEY_D)) actions.toggle_measure = true;

@@ -185,7 +185,6 @@ struct HudModel {
   std::string view_text;                // empty: there is no view to follow
   std::string lent_text;                // empty: one sees with one's own eyes
   bool can_lend_view = false;           // there is a tool to see with
-  std::string ghost_text;               // empty: it is not to be shown
   std::vector<HudOwnForce> own_forces;  // of a live session
   float own_peak_n = 0;                 // of all of them together, in the last seconds
   std::vector<HudFeltHand> felt_hands;  // shown with the rate
@@ -201,7 +200,7 @@ struct HudModel {
 
 struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
-  bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
+  bool toggle_rate = false, reset_camera = false, screenshot = false;
   bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool next_lent_view = false;

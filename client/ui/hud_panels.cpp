@@ -9,7 +9,6 @@
 
 #include "client/ui/banner_text.h"
 #include "client/ui/panel_style.h"
-#include "client/ui/solver_text.h"
 
 namespace trocar::ui {
 namespace {
@@ -29,7 +28,6 @@ ImVec4 colour_of(RateTone tone) {
 }
 
 std::string far_sweeps(const wire::SolveFigures& solve) {
-  if (solve.is_reduced()) return "by the patch";
   if (solve.far_sweeps == 0) return "rest";
   if (solve.far_interval > 1) return format("%u in %u ticks", solve.far_sweeps, solve.far_interval);
   return std::to_string(solve.far_sweeps);
@@ -53,18 +51,6 @@ void rate_rows(const HudModel& model) {
   if (!text.load.empty()) row("next tick", text.load + " allowed");
   if (!text.changes.empty()) row("changes", text.changes);
   row("time", format("%.0f %% of real time", 100 * static_cast<double>(rate.time_rate)));
-}
-
-void solver_rows(const HudModel& model) {
-  if (!model.figures.solve.solver) return;
-  const SolverText text = describe(*model.figures.solve.solver);
-  ImGui::TableNextRow();
-  ImGui::TableNextColumn();
-  ImGui::TextDisabled("solver");
-  ImGui::TableNextColumn();
-  ImGui::TextColored(text.is_reduced ? kGood : kNotice, "%s", text.state.c_str());
-  // The panel is as tall without a patch, so that it does not jump at every hand-over.
-  row("estimated error", text.error.empty() ? "-" : text.error);
 }
 
 void help_row(const char* key, const char* what) {
@@ -104,7 +90,6 @@ void figure_rows(const HudModel& model) {
   if (f.solve.layer_sweeps[0] == 0)
     row("sweeps", format("%u, all other nodes %s", f.solve.sweeps, far_sweeps(f.solve).c_str()));
   rate_rows(model);
-  solver_rows(model);
   row("residual", format("%.2g mN", static_cast<double>(f.solve.residual_n) * 1e3));
   row("regions", std::to_string(f.near.region_count));
   if (f.relaxation) {
@@ -131,7 +116,6 @@ Box draw_session_panel(const HudModel& model, float scale) {
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
     row("session time", clock_text(model.session_seconds));
     if (model.is_recorded) row("recorded", *model.is_recorded ? "yes" : "no");
-    if (!model.ghost_text.empty()) row("ghost", model.ghost_text);
     if (model.shows_rate) figure_rows(model);
     if (!model.is_paused && model.surface_age_ms &&
         (model.shows_rate || *model.surface_age_ms > kOldPictureMs))
@@ -245,10 +229,6 @@ Box draw_help(const HudModel& model, const Box& timeline, const Sides& sides, co
     help_row("A", model.shows_arrows ? "hide force arrows" : "show force arrows");
     help_row("R",
              model.shows_rate ? "hide the figures for research" : "show the figures for research");
-    if (model.figures.solve.solver && !model.timeline)
-      help_row("G", model.ghost_text.empty() ? "show the full solution: a net, yellow where it is "
-                                               "0.25 mm off, red from 1 mm on"
-                                             : "hide the full solution");
     help_row("F12", "screenshot into the current folder");
     help_row("H, F1", "hide this");
     ImGui::EndTable();

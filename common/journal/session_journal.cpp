@@ -53,14 +53,6 @@ Status SessionJournal::read_info() {
       !parse_number(entries, "organ_hash", 16, info_.organ_hash))
     return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
                                          " lacks start_utc_ns, sim_version or organ_hash"};
-  if (entries.contains("reduction_hash")) {
-    auto& reduction = info_.reduction.emplace();
-    if (!parse_number(entries, "reduction_hash", 16, reduction.hash))
-      return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
-                                           " has a reduction_hash that is no number"};
-    reduction.file = text("reduction_file");
-    reduction.source = text("reduction_source");
-  }
   for (const auto& [name, from] :
        {std::pair{"continues", &info_.continues}, {"trimmed", &info_.trimmed}}) {
     const auto tick = std::string(name) + "_tick";
@@ -203,10 +195,6 @@ Status SessionJournal::read_participants(Tick from, Tick to,
 Status SessionJournal::read_claims(Tick from, Tick to,
                                    const TickVisitor<proto::ClaimLog>& visitor) {
   return read_topic(JournalTopic::Claims, from, to, visitor);
-}
-Status SessionJournal::read_solver_changes(Tick from, Tick to,
-                                           const TickVisitor<proto::SolverLog>& visitor) {
-  return read_topic(JournalTopic::Solver, from, to, visitor);
 }
 Status SessionJournal::read_hands(Tick from, Tick to, const TickVisitor<proto::HandLog>& visitor) {
   return read_topic(JournalTopic::Hands, from, to, visitor);

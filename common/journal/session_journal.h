@@ -30,7 +30,6 @@ struct SessionInfo {
   std::string protocol;  // "major.minor"
   std::string organ_name;
   std::uint64_t organ_hash = 0;
-  std::optional<ReductionDescription> reduction;  // that the session had
   // More than tools acts on the tissue. loads() has it, but for journals that were written before
   // there were loads in them: their ticks cannot be simulated again.
   bool has_external_loads = false;
@@ -81,7 +80,6 @@ class SessionJournal {
   Status read_frame_states(Tick from, Tick to, const TickVisitor<proto::FrameState>& visitor);
   Status read_participants(Tick from, Tick to, const TickVisitor<proto::Participants>& visitor);
   Status read_claims(Tick from, Tick to, const TickVisitor<proto::ClaimLog>& visitor);
-  Status read_solver_changes(Tick from, Tick to, const TickVisitor<proto::SolverLog>& visitor);
   Status read_hands(Tick from, Tick to, const TickVisitor<proto::HandLog>& visitor);
   Status read_lessons(Tick from, Tick to, const TickVisitor<proto::LessonRecord>& visitor);
   Status read_snapshots(Tick from, Tick to, const TickVisitor<proto::WorldSnapshot>& visitor);

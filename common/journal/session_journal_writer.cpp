@@ -40,11 +40,6 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
       std::to_string(session.protocol_major) + "." + std::to_string(session.protocol_minor);
   metadata.entries["organ_name"] = session.organ_name;
   metadata.entries["organ_hash"] = hex(session.organ_hash);
-  if (session.reduction) {
-    metadata.entries["reduction_hash"] = hex(session.reduction->hash);
-    metadata.entries["reduction_file"] = session.reduction->file;
-    metadata.entries["reduction_source"] = session.reduction->source;
-  }
   if (session.continues) {
     metadata.entries["continues_file"] = session.continues->file;
     metadata.entries["continues_tick"] = std::to_string(session.continues->tick);

@@ -25,12 +25,11 @@ struct SessionDescription {
   std::uint32_t protocol_major = kProtocolMajor, protocol_minor = kProtocolMinor;
   std::string organ_name;
   std::uint64_t organ_hash = 0;
-  std::optional<ReductionDescription> reduction;  // nothing: the session has none
-  bool has_external_loads = false;                // see SessionInfo
-  bool starts_from_snapshot = false;              // likewise
-  bool has_implicit_strain = false;               // likewise
-  std::optional<Continuation> continues;          // nothing: it begins with the session
-  std::optional<Continuation> trimmed;            // nothing: nothing was taken off its beginning
+  bool has_external_loads = false;        // see SessionInfo
+  bool starts_from_snapshot = false;      // likewise
+  bool has_implicit_strain = false;       // likewise
+  std::optional<Continuation> continues;  // nothing: it begins with the session
+  std::optional<Continuation> trimmed;    // nothing: nothing was taken off its beginning
 };
 
 class SessionJournalWriter {
@@ -80,10 +79,6 @@ class SessionJournalWriter {
   [[nodiscard]] Status write_claims(Tick tick, std::uint64_t now_ns,
                                     const proto::ClaimLog& claims) {
     return write(JournalTopic::Claims, tick, now_ns, claims);
-  }
-  [[nodiscard]] Status write_solver(Tick tick, std::uint64_t now_ns,
-                                    const proto::SolverLog& changes) {
-    return write(JournalTopic::Solver, tick, now_ns, changes);
   }
   [[nodiscard]] Status write_frame_state(Tick tick, std::uint64_t now_ns,
                                          const proto::FrameState& state) {

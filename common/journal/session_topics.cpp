@@ -26,7 +26,6 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/frame_state", proto::FrameState::descriptor()},
       {"/gap", proto::JournalGap::descriptor()},
       {"/topology/change", proto::SurfaceChange::descriptor()},
-      {"/solver", proto::SolverLog::descriptor()},
       {"/loads", proto::ExternalLoads::descriptor()},
       {"/hands", proto::HandLog::descriptor()},
       {"/lesson", proto::LessonRecord::descriptor()},

@@ -12,8 +12,6 @@
 //   /topology/change SurfaceChange    frames that begin an epoch
 //   /participants    Participants     on change
 //   /claims          ClaimLog         frames that have claim events
-//   /solver          SolverLog        frames in which another solver took over, or gave another
-//                                     reason
 //   /hands           HandLog          what hands that feel have felt, as their clients said
 //   /lesson          LessonRecord     what instructors did with people, what people said, where
 //                                     they pointed, and the view to follow
@@ -52,7 +50,6 @@ enum class JournalTopic : std::uint8_t {
   FrameState,
   Gap,
   TopologyChange,
-  Solver,
   Loads,
   Hands,
   Lesson,
@@ -60,7 +57,7 @@ enum class JournalTopic : std::uint8_t {
   Overview,
   Bleeding,
 };
-inline constexpr int kJournalTopicCount = 18;
+inline constexpr int kJournalTopicCount = 17;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";
@@ -68,16 +65,6 @@ inline constexpr const char* kSessionMetadataName = "trocar.session";
 const char* topic_name(JournalTopic topic);
 std::optional<JournalTopic> topic_of(std::string_view name);
 const google::protobuf::Descriptor& topic_message(JournalTopic topic);
-
-// A session that had a local reduction cannot be simulated again without it. The metadata name it
-// as reduction_hash, reduction_file and reduction_source; absent without one.
-struct ReductionDescription {
-  std::uint64_t hash = 0;  // organ::reduction_hash
-  std::string file;        // its name, without folders
-  std::string source;      // organ::LocalReduction::source
-
-  bool operator==(const ReductionDescription&) const = default;
-};
 
 // A journal that goes on with the session of another one, after the server was killed: its first
 // snapshot is of this tick, and its ticks go on from there. The metadata say so as continues_file

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "proto/wire.pb.h"
 
@@ -12,24 +11,9 @@ static_assert(static_cast<int>(RateLevel::Full) == proto::RATE_FULL &&
               static_cast<int>(RateLevel::Reduced) == proto::RATE_REDUCED &&
               static_cast<int>(RateLevel::Overloaded) == proto::RATE_OVERLOADED &&
               kRateLevels == proto::RateLevel_ARRAYSIZE);
-static_assert(static_cast<int>(SolverReason::None) == proto::SOLVER_UNSPECIFIED &&
-              static_cast<int>(SolverReason::Idle) == proto::SOLVER_IDLE &&
-              static_cast<int>(SolverReason::Fits) == proto::SOLVER_FITS &&
-              static_cast<int>(SolverReason::Frozen) == proto::SOLVER_FROZEN &&
-              static_cast<int>(SolverReason::Outside) == proto::SOLVER_OUTSIDE &&
-              static_cast<int>(SolverReason::Force) == proto::SOLVER_FORCE &&
-              static_cast<int>(SolverReason::Cut) == proto::SOLVER_CUT &&
-              static_cast<int>(SolverReason::Error) == proto::SOLVER_ERROR &&
-              static_cast<int>(SolverReason::Off) == proto::SOLVER_OFF &&
-              static_cast<int>(SolverReason::Preparing) == proto::SOLVER_PREPARING &&
-              kSolverReasons == proto::SolverReason_ARRAYSIZE);
 
 namespace {
 
-// Clients take no number that is not finite.
-float finite(float value) {
-  return std::isfinite(value) ? value : std::numeric_limits<float>::max();
-}
 bool is_sane(float value) {
   return std::isfinite(value) && value >= 0;
 }
@@ -43,20 +27,6 @@ Status read(const proto::RelaxationState& message, RelaxationFigures& figures) {
   if (!std::isfinite(figures.energy_j) || !std::isfinite(figures.volume_change) ||
       !std::isfinite(figures.relaxed_share))
     return bad("relaxation: a number is not finite");
-  return {};
-}
-
-Status read(const proto::SolverState& message, SolverFigures& figures) {
-  figures.is_reduced = message.is_reduced();
-  for (const auto patch : message.patch())
-    if (patch == 0 || !figures.patches.add(patch - 1))
-      return bad("solver: a patch has the number 0, or there are over 4");
-  if (message.reason() > 0 && message.reason() < kSolverReasons)
-    figures.reason = static_cast<SolverReason>(message.reason());
-  figures.estimate = message.estimate();
-  figures.largest_node_force_n = message.largest_node_force_n();
-  if (!is_sane(figures.estimate) || !is_sane(figures.largest_node_force_n))
-    return bad("solver: a number is negative or not finite");
   return {};
 }
 
@@ -102,15 +72,6 @@ Status read(const proto::RateState& message, FrameFigures& figures) {
 
 }  // namespace
 
-void write(const SolverFigures& figures, proto::SolverState& message) {
-  message.set_is_reduced(figures.is_reduced);
-  message.clear_patch();
-  for (const auto patch : figures.patches.all()) message.add_patch(patch + 1);
-  message.set_reason(static_cast<proto::SolverReason>(figures.reason));
-  message.set_estimate(finite(figures.estimate));
-  message.set_largest_node_force_n(finite(figures.largest_node_force_n));
-}
-
 void write(const PaceFigures& figures, proto::FrameState& message) {
   message.set_tick_cpu_us(figures.tick_median_us);
   message.set_tick_cpu_p99_us(figures.tick_p99_us);
@@ -139,8 +100,6 @@ void write(const FrameFigures& figures, proto::FrameState& message) {
   for (const auto sweeps : figures.solve.layer_sweeps)
     message.mutable_rate()->add_layer_sweeps(sweeps);
   message.set_residual_n(figures.solve.residual_n);
-  message.clear_solver();
-  if (figures.solve.solver) write(*figures.solve.solver, *message.mutable_solver());
   message.clear_relaxation();
   if (figures.relaxation) {
     auto& relaxation = *message.mutable_relaxation();
@@ -174,8 +133,6 @@ Result<FrameFigures> read(const proto::FrameState& message) {
   if (message.has_relaxation())
     if (auto s = read(message.relaxation(), figures.relaxation.emplace()); !s) return s.error();
   if (message.has_blood()) figures.blood = read(message.blood());
-  if (message.has_solver())
-    if (auto s = read(message.solver(), figures.solve.solver.emplace()); !s) return s.error();
   if (message.has_rate())
     if (auto s = read(message.rate(), figures); !s) return s.error();
   return figures;

@@ -7,7 +7,6 @@
 
 namespace trocar::proto {
 class FrameState;
-class SolverState;
 }  // namespace trocar::proto
 
 namespace trocar::wire {
@@ -15,10 +14,9 @@ namespace trocar::wire {
 // Each writes over what the message has of these figures, and leaves the rest of it as it is.
 void write(const FrameFigures& figures, proto::FrameState& message);
 void write(const PaceFigures& figures, proto::FrameState& message);
-void write(const SolverFigures& figures, proto::SolverState& message);
 
 // A message is outside data: an error is one line that names the field. Figures that an older
-// server does not tell stay as by default, and so does a level or a reason of a newer one.
+// server does not tell stay as by default, and so does a level of a newer one.
 Result<FrameFigures> read(const proto::FrameState& message);
 
 }  // namespace trocar::wire

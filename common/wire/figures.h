@@ -7,10 +7,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
-#include <string>
-
-#include "common/base/tick.h"
 
 namespace trocar::wire {
 
@@ -33,65 +29,13 @@ struct NearFigures {
   bool operator==(const NearFigures&) const = default;
 };
 
-// Ascending numbers, from 0, of the patches of a far-field model that act together.
-struct PatchSet {
-  static constexpr std::size_t kMaxPatches = 4;
-
-  std::array<std::uint32_t, kMaxPatches> patches{};
-  std::uint32_t count = 0;
-
-  std::span<const std::uint32_t> all() const { return {patches.data(), count}; }
-  bool has(std::uint32_t patch) const;
-  // False: there is no room.
-  bool add(std::uint32_t patch);
-  bool operator==(const PatchSet&) const = default;
-};
-// "patch 3", "patches 3 + 12": people count from 1.
-std::string name_of(const PatchSet& patches);
-
-// The reason says why that solver moves the tissue which does. The numbers are those of
-// proto::SolverReason.
-enum class SolverReason : std::uint8_t {
-  None,       // not told: there is no model of the far field, or the reason is a newer server's
-  Idle,       // nothing has been touched yet
-  Fits,       // a patch has what is touched
-  Frozen,     // the tissue beyond the limits stands still
-  Outside,    // touched where no patch is, or by tools that touch more patches than act together
-  Force,      // a node bears more than the model knows
-  Cut,        // tissue was cut just now, or is where it is touched
-  Error,      // the estimate of the error is too large
-  Off,        // it was decided so
-  Preparing,  // patches that are touched together are being made ready to act together
-};
-inline constexpr std::uint8_t kSolverReasons = 10;
-const char* name_of(SolverReason reason);
-
-// In a session with a reduction, this says which solver moves the tissue.
-struct SolverFigures {
-  bool is_reduced = false;
-  SolverReason reason = SolverReason::None;
-  PatchSet patches;    // while they act
-  float estimate = 0;  // of the error in the norm of energy, of the tick before
-  float largest_node_force_n = 0;
-
-  bool operator==(const SolverFigures&) const = default;
-};
-
-// Another solver acts than in the tick before, or another patch, or for another reason.
-struct SolverChange {
-  Tick tick = 0;
-  SolverFigures figures;
-};
-
 // These figures say what one tick's solve took and came to.
 struct SolveFigures {
   std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
   std::uint32_t far_interval = 1;            // ticks for which these far sweeps are
   LayerCounts layer_sweeps{};                // of active nodes, as decided; 0: not told
   float residual_n = 0;  // root mean square force imbalance of active nodes in the last sweep
-  std::optional<SolverFigures> solver;  // of sessions with a reduction
 
-  bool is_reduced() const { return solver && solver->is_reduced; }
   bool operator==(const SolveFigures&) const = default;
 };
 

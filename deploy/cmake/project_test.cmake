@@ -2,7 +2,7 @@
 #              [TIMEOUT seconds] [READER | SANITIZED] [ALONE] [APART] [OPTIMISED]
 #              [CAMPAIGN])
 # A GoogleTest program. deploy/test runs all its tests in one process, or in several parts if they take long,
-# so what several of them need (an organ, a reduction) is made once. READS: files and folders of the
+# so what several of them need (an organ, for example) is made once. READS: files and folders of the
 # repository that they open. COST: about how long all of them take, on one core. READER: it tests what
 # reads or decodes outside data, so deploy/test --with-clang runs it a second time with address and
 # undefined-behaviour sanitizers. SANITIZED: deploy/campaign sanitized does, as for readers. ALONE: no other test

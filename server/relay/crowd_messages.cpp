@@ -84,10 +84,6 @@ std::optional<Crowd::Ending> Crowd::handle_message(Watcher& watcher, BytesView b
       connections_.close_after_flush(id, nullptr);
       return std::nullopt;
     }
-    case proto::Envelope::kGhostRequest:
-      if (envelope.ghost_request().is_wanted())
-        connections_.send(watcher.id, replication::encode_no_ghost());
-      return std::nullopt;
     case proto::Envelope::kTeachRequest: {
       proto::Envelope answer;
       auto& event = *answer.mutable_teach_event();

@@ -8,7 +8,6 @@
 #include <string>
 
 #include "common/base/timing.h"
-#include "common/wire/surface_codec.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/tissue/world/surface_layout.h"
 #include "tests/client/live_device.h"
@@ -79,7 +78,6 @@ class PictureTest : public ::testing::Test {
     source.queue_start();
     for (int i = 0; i < 40; ++i) {
       source.queue_frame();
-      if (overlays.ghost) source.queue(ghost_off_by(ghost_quanta_, source.layout().epoch));
       source.poll(replica);
       now_ += 16'000'000;
       if (i % 10 == 9) picture_->draw(replica, source, hands_, now_);
@@ -87,18 +85,6 @@ class PictureTest : public ::testing::Test {
     EXPECT_TRUE(replica.fault().ok());
     if (name != nullptr) keep(name);
     return picture_->image();
-  }
-  static proto::Envelope ghost_off_by(std::int32_t quanta, std::uint32_t epoch) {
-    const wire::QuantisedSurface offsets(liver().vertex_count(), {quanta, 0, 0});
-    proto::Envelope envelope;
-    auto& ghost = *envelope.mutable_ghost_frame();
-    Bytes payload;
-    wire::encode_keyframe(offsets, payload);
-    ghost.set_status(proto::GHOST_FOLLOWS);
-    ghost.set_epoch(epoch);
-    ghost.set_payload(payload.data(), payload.size());
-    ghost.set_offsets_crc(wire::surface_crc(offsets));
-    return envelope;
   }
   void keep(const char* name) {
     if (const char* folder = std::getenv("TROCAR_PICTURES")) {
@@ -122,7 +108,6 @@ class PictureTest : public ::testing::Test {
   replica::Replica replica_{[this](const proto::Envelope& m) { return source_.send(m); }};
   Hands hands_;
   std::uint64_t now_ = monotonic_ns();
-  std::int32_t ghost_quanta_ = 0;  // quanta along x, of pictures with the ghost
 };
 
 TEST_F(PictureTest, ShowsTissueInTheMiddleAndACalmBackground) {
@@ -223,26 +208,6 @@ TEST_F(PictureTest, ADeviceMovesItsToolAsThePictureIsSeen) {
   EXPECT_GE(most.z - least.z, 0.008) << "the right of the screen is along z";
   EXPECT_LT(most.x - least.x, 1e-4);
   EXPECT_LT(most.y - least.y, 1e-4);
-}
-
-TEST_F(PictureTest, TheGhostIsANetOverTheTissueOfTheColourOfItsDistance) {
-  const Overlays nothing{.regions = false, .arrows = false},
-      ghost{.regions = false, .arrows = false, .ghost = true};
-  const render::Image plain = picture_of(nothing);
-  // Draws the ghost with each vertex this far off along x.
-  const auto off_by = [&](std::int32_t quanta, const char* name) {
-    ghost_quanta_ = quanta;
-    return picture_of(ghost, {}, name);
-  };
-  const auto same = off_by(0, "ghost"), far = off_by(40, "ghost_far");
-  const int changed = difference(plain, same);
-  EXPECT_GT(changed, 5000);
-  EXPECT_GT(difference(same, far), 5000);
-  const Pixel without = mean(plain, 560, 300, 640, 360), blue = mean(same, 560, 300, 640, 360),
-              red = mean(far, 560, 300, 640, 360);
-  EXPECT_GT(blue.b, without.b + 5);
-  EXPECT_GT(red.r, blue.r + 5);
-  EXPECT_GT(blue.b, red.b + 2);
 }
 
 TEST_F(PictureTest, SlowTimeIsSaidInWords) {

@@ -264,102 +264,6 @@ TEST_F(ReplicaTest, WhatHasRelaxedIsKept) {
   EXPECT_TRUE(replica_.fault().ok());
 }
 
-TEST_F(ReplicaTest, WhichSolverActsIsKept) {
-  start();
-  EXPECT_FALSE(replica_.newest()->figures.solve.solver) << "there is no reduction";
-  int reason = proto::SOLVER_FITS;
-  source_.tamper = [&](proto::Envelope& m) {
-    if (!m.has_frame_state()) return true;
-    auto& solver = *m.mutable_frame_state()->mutable_solver();
-    solver.set_is_reduced(true);
-    solver.clear_patch();
-    solver.add_patch(12);
-    solver.set_reason(static_cast<proto::SolverReason>(reason));
-    solver.set_estimate(0.05f);
-    solver.set_largest_node_force_n(0.2f);
-    return true;
-  };
-  advance(1);
-  EXPECT_EQ(replica_.newest()->figures.solve.solver,
-            (wire::SolverFigures{true, wire::SolverReason::Fits, {{11}, 1}, 0.05f, 0.2f}));
-  // A reason of a newer server is as if none were given; the rest counts.
-  for (const int newer : {10, 1000, -1}) {
-    reason = newer;
-    advance(1);
-    EXPECT_EQ(replica_.newest()->figures.solve.solver,
-              (wire::SolverFigures{true, wire::SolverReason::None, {{11}, 1}, 0.05f, 0.2f}));
-  }
-  source_.tamper = nullptr;
-  advance(1);
-  EXPECT_FALSE(replica_.newest()->figures.solve.solver);
-  EXPECT_TRUE(replica_.fault().ok());
-}
-
-TEST_F(ReplicaTest, TheGhostIsTakenWhereItFits) {
-  start();
-  const auto vertices = source_.surface().size();
-  wire::QuantisedSurface offsets(vertices);
-  offsets[5] = {10, 0, -20};
-  const auto message_of = [&](const wire::QuantisedSurface& values) {
-    proto::Envelope envelope;
-    auto& ghost = *envelope.mutable_ghost_frame();
-    Bytes payload;
-    wire::encode_keyframe(values, payload);
-    ghost.set_status(proto::GHOST_FOLLOWS);
-    ghost.set_epoch(source_.layout().epoch);
-    ghost.set_payload(payload.data(), payload.size());
-    ghost.set_offsets_crc(wire::surface_crc(values));
-    ghost.set_largest_m(7e-4f);
-    ghost.set_root_mean_square_m(1e-5f);
-    ghost.set_behind_ms(48);
-    return envelope;
-  };
-  const auto give = [&](proto::Envelope message) {
-    source_.queue(std::move(message));
-    source_.poll(replica_);
-  };
-  give(message_of(offsets));
-  EXPECT_EQ(replica_.ghost().status, GhostStatus::Follows);
-  ASSERT_EQ(replica_.ghost().offsets.size(), vertices);
-  EXPECT_EQ(replica_.ghost().offsets[5], wire::to_metres(offsets[5]));
-  EXPECT_EQ(replica_.ghost().largest_m, 7e-4f);
-  EXPECT_EQ(replica_.ghost().behind_ms, 48u);
-  EXPECT_EQ(replica_.counters().ghosts, 1u);
-
-  std::uint64_t ignored = 0;
-  const auto expect_ignored = [&](proto::Envelope message, const char* what) {
-    give(std::move(message));
-    EXPECT_TRUE(replica_.ghost().offsets.empty()) << what;
-    EXPECT_EQ(replica_.counters().ghosts_ignored, ++ignored) << what;
-  };
-  auto bad = message_of(offsets);
-  bad.mutable_ghost_frame()->set_epoch(source_.layout().epoch + 1);
-  expect_ignored(bad, "epoch");
-  bad = message_of(offsets);
-  bad.mutable_ghost_frame()->set_offsets_crc(1);
-  expect_ignored(bad, "crc");
-  bad = message_of(offsets);
-  bad.mutable_ghost_frame()->set_largest_m(std::numeric_limits<float>::quiet_NaN());
-  expect_ignored(bad, "not a number");
-  bad = message_of(wire::QuantisedSurface(vertices + 1));
-  expect_ignored(bad, "one more");
-  bad = message_of(wire::QuantisedSurface(vertices - 1));
-  expect_ignored(bad, "one less");
-  const auto whole = message_of(offsets).ghost_frame().payload();
-  for (std::size_t length = 0; length < whole.size(); ++length) {
-    bad = message_of(offsets);
-    bad.mutable_ghost_frame()->set_payload(whole.substr(0, length));
-    expect_ignored(bad, "cut off");
-  }
-  bad = message_of(offsets);
-  bad.mutable_ghost_frame()->set_status(static_cast<proto::GhostStatus>(77));
-  give(bad);
-  EXPECT_EQ(replica_.ghost().status, GhostStatus::Unknown);
-  EXPECT_TRUE(replica_.fault().ok());
-  advance(20);
-  expect_in_step();
-}
-
 wire::FineSurface fine_triangle() {
   wire::FineSurface fine;
   for (const std::int32_t q : {0, 20'000, 40'000}) fine.quanta.push_back({q, q * q % 997, 0});
@@ -455,13 +359,6 @@ TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
                 m.mutable_frame_state()->mutable_relaxation()->set_volume_change(kInfinity);
             }).find("FrameState.relaxation"),
             std::string::npos);
-  for (const float bad : {std::nanf(""), kInfinity, -1.0f})
-    EXPECT_NE(fault_of([&](proto::Envelope& m) {
-                if (m.has_frame_state())
-                  m.mutable_frame_state()->mutable_solver()->set_estimate(bad);
-              }).find("FrameState.solver"),
-              std::string::npos)
-        << bad;
   EXPECT_NE(fault_of([](proto::Envelope& m) {
               if (m.has_welcome()) m.mutable_welcome()->set_protocol_major(9);
             }).find("protocol 9"),

@@ -1,5 +1,5 @@
-// Hands feel while things change at the server: tissue is cut, it tears, another
-// hand tugs at it, and a local reduction moves it. This prints what it measured.
+// Hands feel while things change at the server: tissue is cut, it tears, and another hand tugs at
+// it. This prints what it measured.
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,8 @@
 
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/average_strain.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 #include "tests/feel/felt_motions.h"
 #include "tests/haptics/motions.h"
-#include "tests/reduce/reduced_block.h"
 
 namespace trocar::haptics::testing {
 namespace {
@@ -130,43 +128,6 @@ TEST(FeltChanges, AReferenceThatIsNotMadeAgainFails) {
   EXPECT_LT(outcome.step_n, outcome.true_step_n);
   EXPECT_GT(mutant.step_n, mutant.true_step_n) << "it jerks more than the tissue does";
   EXPECT_GT(mutant.rms, outcome.rms);
-}
-
-TEST(FeltChanges, AReductionAtWorkIsFeltAsTheFullTissue) {
-  constexpr tool::ToolShape kWide{.radius_m = 0.012f, .length_m = 0.2f, .reach_m = 0.012f};
-  constexpr double kBlock_n_m = 300;  // so that the hand goes in by 4 mm
-  const reduce::testing::ReducedBlock made;
-  const step::Simulation block(made.organ, 1, reduction::at_work(made.local));
-  const Frame place = place_at(block, kWide, made.centre(made.near_top(0)), {0, 1, 0});
-  const auto palpate = [&](bool is_reduced) {
-    FeltMotion felt = plain(palpation(kBlock_n_m, 1));
-    felt.true_decisions.is_reduction_off = true;
-    felt.decisions.is_reduction_off = !is_reduced;
-    int touched = 0, reduced = 0;
-    FeelSettings settings;
-    settings.at_server = [&](wire::HapticPatch& patch, const FeltOrgan& server) {
-      if (patch.kind != wire::TouchKind::Push) return;
-      ++touched;
-      reduced += server.simulation().context().report.solve.figures.is_reduced();
-    };
-    const auto outcome =
-        measure(measured_of(felt.motion), feel(block, place, felt, kWide, settings));
-    print(is_reduced ? "reduced" : "full", outcome);
-    EXPECT_GT(touched, 100);
-    if (is_reduced)
-      EXPECT_GT(reduced, touched / 2);
-    else
-      EXPECT_EQ(reduced, 0);
-    return outcome;
-  };
-  const auto full = palpate(false), reduced = palpate(true);
-  EXPECT_LT(reduced.rms, 0.05);
-  EXPECT_NEAR(reduced.rms, full.rms, 0.005);
-  EXPECT_NEAR(reduced.gain, full.gain, 0.02);
-  EXPECT_NEAR(reduced.phase_deg, 0, 5);
-  EXPECT_LT(reduced.cycle_mj, 0);
-  EXPECT_EQ(reduced.free_n, 0);
-  EXPECT_LT(reduced.step_n, 0.06);
 }
 
 }  // namespace

@@ -83,7 +83,6 @@ FeelRecord run(const step::Simulation& simulation, const tool::ToolShape& shape,
   const Motion& motion = felt.motion;
   FeltOrgan server(simulation, shape), truth(simulation, shape);
   server.decide(felt.decisions);
-  truth.decide(felt.true_decisions);
   const auto client = make_client(touch::haptic_laws(simulation.organ()));
   std::uint64_t now_us = 0;
   device::SimulatedDevice device(

@@ -27,8 +27,8 @@ struct FeltMotion {
   std::function<void(double s, hands::TickInputs&)> others = {};
   double gone_s = -1, back_s = -1;  // between them nothing passes the line
   double server_pace = 1;           // simulated time over real time; 1 / a whole number
-  // The ticks of the server and of the truth are decided so.
-  step::TickDecisions decisions = {}, true_decisions = {};
+  // The server's ticks are decided so.
+  step::TickDecisions decisions = {};
 };
 
 struct FeelRecord : Record {

@@ -37,8 +37,8 @@
 #include "server/organs/label_map/label_solid.h"
 #include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/material/material_file.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
+#include "server/organs/organ/packed_file.h"
 #include "server/organs/surface/closed_surface.h"
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/access/code_book.h"
@@ -295,10 +295,7 @@ bool decode_organ(BytesView bytes) {
                                              : checked(organ::decode_organ(bytes));
 }
 bool decode_reduction(BytesView bytes) {
-  return decode_packed(bytes, organ::kDoganReductionMagic, 1, dogan::unpack_reduction);
-}
-bool decode_local_reduction(BytesView bytes) {
-  return decode_packed(bytes, organ::kLocalReductionMagic, 2, organ::unpack_local_reduction);
+  return decode_packed(bytes, dogan::kReductionMagic, 1, dogan::unpack_reduction);
 }
 // The fine surface is valid. The block is large, so that surfaces of all sizes lie near its own.
 void embed_surface(const surface::RawSurface& raw, const std::string& name) {
@@ -433,7 +430,6 @@ constexpr Decoder kDecoders[] = {
     {"journal", decode_journal},
     {"organ", decode_organ},
     {"reduction", decode_reduction},
-    {"local_reduction", decode_local_reduction},
     {"gmsh", decode_mesh<kGmsh>},
     {"vtk", decode_mesh<kVtk>},
     {"vtu", decode_mesh<kVtu>},

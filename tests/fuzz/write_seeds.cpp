@@ -17,7 +17,6 @@
 #include "proto/wire.pb.h"
 #include "server/broadcast/piece.h"
 #include "server/organs/catalogue/builtin_organs.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/bleeding/blood.h"
@@ -25,7 +24,6 @@
 #include "tests/dicom/dicom_sample.h"
 #include "tests/journal/session_samples.h"
 #include "tests/papers/synthetic_reduction.h"
-#include "tests/reduce/small_organ.h"
 #include "tests/support/surface_edits.h"
 
 namespace {
@@ -242,13 +240,11 @@ int main(int argc, char** argv) {
   save_blood();
   save_handshakes();
   save_dicom();
-  const auto block = reduce::testing::block(3, 3, 3);
+  const auto block = dogan::testing::block(3, 3, 3);
   save("organ", "block", organ::encode_organ(block));
   save("organ", "block.organ", organ::pack_organ(block));
   save("reduction", "synthetic.reduction",
        dogan::pack_reduction(dogan::testing::synthetic_reduction(block, 3)));
-  save("local_reduction", "synthetic.reduction",
-       *organ::pack_local_reduction(reduce::testing::synthetic_local_reduction(block)));
   const auto path = fs::temp_directory_path() / "trocar-seed.mcap";
   fs::remove(path);
   {

@@ -37,7 +37,6 @@ TEST_F(session_journal, info_of_a_finished_session) {
   EXPECT_EQ(info.protocol, std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor));
   EXPECT_EQ(info.organ_name, "liver");
   EXPECT_EQ(info.organ_hash, 0x0123456789abcdefu);
-  EXPECT_FALSE(info.reduction);
   EXPECT_EQ(info.last_tick, 4000u);
   EXPECT_EQ(info.gap_messages, 7u);
   EXPECT_TRUE(info.is_finished);
@@ -78,37 +77,6 @@ TEST_F(session_journal, a_list_that_is_small_in_the_file_and_large_in_memory_is_
   EXPECT_NE(journal->info().summary.find("message on /participants at tick 4016 is malformed"),
             std::string::npos)
       << journal->info().summary;
-}
-
-TEST_F(session_journal, a_reduction_is_named_and_solver_changes_are_read_back) {
-  const ReductionDescription reduction{0xfedcba9876543210u, "liver.reduction", "liver, 4 patches"};
-  {
-    auto writer = SessionJournalWriter::create(
-        path_, {.start_utc_ns = kSessionStart, .organ_name = "liver", .reduction = reduction});
-    ASSERT_TRUE(writer.ok());
-    for (const Tick tick : {160u, 1600u}) {
-      proto::SolverLog log;
-      auto& change = *log.add_change();
-      change.set_tick(tick - 5);
-      change.mutable_solver()->set_is_reduced(tick == 160);
-      change.mutable_solver()->set_estimate(0.25f);
-      change.set_text(tick == 160 ? "reduced, patch 3" : "full, tissue was cut");
-      ASSERT_TRUE((*writer)->write_solver(tick, kSessionStart, log).ok());
-    }
-    ASSERT_TRUE((*writer)->close().ok());
-  }
-  auto journal = open_journal();
-  ASSERT_TRUE(journal);
-  EXPECT_EQ(journal->info().reduction, reduction);
-  std::vector<std::string> texts;
-  const auto read =
-      journal->read_solver_changes(0, ~Tick{0}, [&](Tick, const proto::SolverLog& log) {
-        for (const auto& change : log.change())
-          texts.push_back(std::to_string(change.tick()) + " " + change.text());
-        return true;
-      });
-  EXPECT_TRUE(read.ok());
-  EXPECT_EQ(texts, (std::vector<std::string>{"155 reduced, patch 3", "1595 full, tissue was cut"}));
 }
 
 TEST_F(session_journal, every_tick_record_once_and_in_order) {

@@ -125,7 +125,7 @@ TEST_F(Malformed, messages_of_another_role_or_direction_end_the_session) {
   EXPECT_EQ(answer_to(mark, proto::ROLE_SURGEON).reason(), proto::GOODBYE_ROLE);
   mark.mutable_mark_request()->set_action(static_cast<proto::MarkAction>(3));
   EXPECT_EQ(answer_to(mark, proto::ROLE_INSTRUCTOR).reason(), proto::GOODBYE_PROTOCOL_ERROR);
-  std::vector<Envelope> wrong(10);
+  std::vector<Envelope> wrong(9);
   wrong[0].mutable_welcome();
   wrong[1].mutable_surface_topology();
   wrong[2].mutable_surface_frame();
@@ -134,7 +134,6 @@ TEST_F(Malformed, messages_of_another_role_or_direction_end_the_session) {
   wrong[5].mutable_barrier();
   wrong[6].mutable_goodbye()->set_text("you go");
   wrong[7] = make_hello("again", proto::ROLE_SURGEON);
-  wrong[9].mutable_ghost_frame();
   wrong[8].mutable_frame_ack()->set_frame(1'000'000);  // not given yet
   for (const auto& envelope : wrong)
     EXPECT_EQ(answer_to(envelope).reason(), proto::GOODBYE_PROTOCOL_ERROR)

@@ -167,8 +167,6 @@ TEST_F(ServerConfig, FaultsOfFilesAndCombinationsAreFound) {
   expect_fault("organ = '/no/such.organ'\n", ":1: key organ: ", "/no/such.organ");
   expect_fault("organ = 'heart'\n", ":1: key organ: ", "neither liver");
   expect_fault(lattice + "averaged-strain = true\n", ":2: key averaged-strain: ", "");
-  expect_fault("organ = 'elastic-liver'\nreduction = '/no/such.reduction'\n",
-               ":2: key reduction: ", "/no/such.reduction");
   expect_fault("certificate = 'server.pem'\n", ":1: key certificate: ", "requires --key");
   expect_fault("certificate = '/no/c.pem'\nkey = '/no/k.pem'\n",
                ":1: key certificate: ", "/no/c.pem");

@@ -12,13 +12,12 @@
 #include "server/papers/dogan/build.h"
 #include "server/papers/dogan/quality.h"
 #include "tests/papers/synthetic_reduction.h"
-#include "tests/reduce/small_organ.h"
 
 namespace trocar::dogan {
 namespace {
 
 using namespace reduce;
-using reduce::testing::block;
+using testing::block;
 
 using finite_elements::Problem;
 

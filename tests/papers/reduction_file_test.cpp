@@ -9,18 +9,16 @@
 #include <functional>
 #include <limits>
 
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/organs/organ/packed_file.h"
 #include "tests/papers/synthetic_reduction.h"
-#include "tests/reduce/small_organ.h"
 #include "tests/support/files.h"
 #include "tests/support/packed_damage.h"
 
 namespace trocar::dogan {
 namespace {
 
-using reduce::testing::block;
+using testing::block;
 using testing::synthetic_reduction;
 using trocar::testing::expect_bad_file;
 using trocar::testing::save_file;
@@ -99,11 +97,6 @@ TEST_F(ReductionFile, OneOfAnotherOrganIsRefused) {
   heavier.name = "another";
   heavier.material.cut_energy_j_m2 = 5;
   EXPECT_TRUE(read_reduction(path_, heavier).ok());
-}
-
-TEST_F(ReductionFile, OneOfTheOtherMethodIsNamed) {
-  expect_bad(organ::pack(organ::PackedKind{organ::kLocalReductionMagic, "", "", "", 2, 2}, 2, {}),
-             "is a reduction by --method local");
 }
 
 TEST_F(ReductionFile, DamageIsNoticed) {

@@ -1,12 +1,23 @@
 #include "tests/papers/synthetic_reduction.h"
 
+#include "common/base/assert.h"
+#include "server/lab/scenario/scenario_block.h"
+
 namespace trocar::dogan::testing {
+
+organ::Organ block(int nx, int ny, int nz) {
+  auto organ = scenario::make_block({nx, ny, nz, 0.01});
+  TROCAR_ASSERT(organ.ok());
+  material::use_measured(*material::find_measured_material("human_liver_nava2008"),
+                         organ->material);
+  return std::move(*organ);
+}
 
 Reduction synthetic_reduction(const organ::Organ& organ, std::size_t modes) {
   Reduction r;
   r.source = "synthetic";
-  r.mesh_hash = organ::mesh_hash(organ);
-  r.elasticity_hash = organ::elasticity_hash(organ);
+  r.mesh_hash = dogan::mesh_hash(organ);
+  r.elasticity_hash = dogan::elasticity_hash(organ);
   r.node_count = static_cast<std::uint32_t>(organ.mesh.node_count());
   r.snapshot_count = 5;
   r.force_n = 0.4, r.radius_m = 0.015, r.influence_m = 0.02;

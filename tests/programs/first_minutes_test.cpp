@@ -109,7 +109,7 @@ TEST_F(Server, HelpHasTheTrainersOptionsFirstAndTheSolversLast) {
   const auto research = help.find("Research");
   ASSERT_NE(research, std::string::npos) << help;
   for (const char* option : {"--help", "--version", "--organ", "--listen", "--journal", "--seconds",
-                             "--summary", "--reduction", "--workers", "--log-level"})
+                             "--summary", "--workers", "--log-level"})
     EXPECT_LT(help.find(option), research) << option;
   for (const char* option :
        {"--averaged-strain", "--frozen", "--fixed-decisions", "--budget", "--depth", "--nodes",

@@ -282,7 +282,6 @@ TEST_F(Merge, RefusesTicksThatGoBack) {
                  .sim_version = info.sim_version,
                  .organ_name = info.organ_name,
                  .organ_hash = info.organ_hash,
-                 .reduction = info.reduction,
                  .has_external_loads = false,
                  .starts_from_snapshot = false,
                  .has_implicit_strain = false,

@@ -144,7 +144,6 @@ void copy_journal(const std::string& from, const std::string& to, const Edit& ed
                                                  .sim_version = sim_version,
                                                  .organ_name = info.organ_name,
                                                  .organ_hash = info.organ_hash,
-                                                 .reduction = info.reduction,
                                                  .has_external_loads = info.has_external_loads,
                                                  .starts_from_snapshot = info.starts_from_snapshot,
                                                  .has_implicit_strain = info.has_implicit_strain});

@@ -57,8 +57,7 @@ class Trim : public ::testing::Test {
 };
 
 TEST_F(Trim, APartFromTheMiddleVerifiesByItself) {
-  const auto trimmed =
-      trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
+  const auto trimmed = trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   EXPECT_TRUE(trimmed->has_state);
   EXPECT_LE(trimmed->from, kFrom);
@@ -77,8 +76,7 @@ TEST_F(Trim, APartFromTheMiddleVerifiesByItself) {
 }
 
 TEST_F(Trim, ItShowsWhatTheWholeRecordingShowsThere) {
-  const auto trimmed =
-      trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
+  const auto trimmed = trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   auto expected = surfaces_of(recorded_simulation());
   std::erase_if(expected, [&](const auto& entry) {
@@ -101,8 +99,7 @@ TEST_F(Trim, ItShowsWhatTheWholeRecordingShowsThere) {
 }
 
 TEST_F(Trim, FromItsBeginningItIsTheSameRecording) {
-  const auto trimmed =
-      trim(recorded_simulation(), to_, {.from = 0, .to = 100'000, .reduction_file = {}});
+  const auto trimmed = trim(recorded_simulation(), to_, {.from = 0, .to = 100'000});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   EXPECT_EQ(trimmed->to, kRecordedTicks);
   const auto report = verify_journal(to_);
@@ -121,7 +118,7 @@ TEST_F(Trim, FromItsBeginningItIsTheSameRecording) {
 TEST_F(Trim, ASessionThatBleedsVerifiesToo) {
   const auto bleeding = folder_.file("bleeding.mcap");
   record_simulation(bleeding, 0, true);
-  const auto trimmed = trim(bleeding, to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
+  const auto trimmed = trim(bleeding, to_, {.from = kFrom, .to = kTo});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   const auto report = verify_journal(to_);
   ASSERT_TRUE(report.ok());
@@ -130,10 +127,9 @@ TEST_F(Trim, ASessionThatBleedsVerifiesToo) {
 }
 
 TEST_F(Trim, ATrimmedRecordingCanBeTrimmedAndGoneOnWith) {
-  ASSERT_TRUE(
-      trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo, .reduction_file = {}}).ok());
+  ASSERT_TRUE(trim(recorded_simulation(), to_, {.from = kFrom, .to = kTo}).ok());
   const auto shorter = folder_.file("shorter.mcap");
-  const auto trimmed = trim(to_, shorter, {.from = kFrom, .to = kFrom + 200, .reduction_file = {}});
+  const auto trimmed = trim(to_, shorter, {.from = kFrom, .to = kFrom + 200});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   const auto report = verify_journal(shorter);
   ASSERT_TRUE(report.ok());
@@ -146,7 +142,7 @@ TEST_F(Trim, ATrimmedRecordingCanBeTrimmedAndGoneOnWith) {
 TEST_F(Trim, ARecordingOfAnotherReleaseCanBeWatched) {
   const auto other = folder_.file("other.mcap");
   copy_journal(recorded_simulation(), other, kAsItIs, kSimVersion + 1);
-  const auto trimmed = trim(other, to_, {.from = kFrom, .to = kTo, .reduction_file = {}});
+  const auto trimmed = trim(other, to_, {.from = kFrom, .to = kTo});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   EXPECT_FALSE(trimmed->has_state);
   EXPECT_EQ(surfaces_of(to_).size(), (trimmed->to - trimmed->from) / kTicksPerFrame);
@@ -157,23 +153,16 @@ TEST_F(Trim, ARecordingOfAnotherReleaseCanBeWatched) {
 }
 
 TEST_F(Trim, RefusesWhatItCannotCut) {
-  expect_refusal(folder_.file("none.mcap"), {.from = 0, .to = 1, .reduction_file = {}},
-                 "none.mcap");
-  expect_refusal(recorded_simulation(), {.from = 100, .to = 100, .reduction_file = {}},
-                 "--from has to lie before --to");
-  expect_refusal(recorded_simulation(), {.from = kRecordedTicks, .to = 9000, .reduction_file = {}},
+  expect_refusal(folder_.file("none.mcap"), {.from = 0, .to = 1}, "none.mcap");
+  expect_refusal(recorded_simulation(), {.from = 100, .to = 100}, "--from has to lie before --to");
+  expect_refusal(recorded_simulation(), {.from = kRecordedTicks, .to = 9000},
                  "before its end, 2.400 s");
-  expect_refusal(recorded_simulation(), {.from = 1, .to = 2, .reduction_file = {}},
-                 "has no frame between");
-  expect_refusal(recorded_simulation(),
-                 {.from = kFrom, .to = kTo, .reduction_file = "liver.reduction"},
-                 "without a reduction");
+  expect_refusal(recorded_simulation(), {.from = 1, .to = 2}, "has no frame between");
   const auto gapped = folder_.file("gapped.mcap");
   record_simulation(gapped, 800);
-  expect_refusal(gapped, {.from = kFrom, .to = kTo, .reduction_file = {}}, "it has a gap");
+  expect_refusal(gapped, {.from = kFrom, .to = kTo}, "it has a gap");
   trocar::testing::save_file(to_, {});
-  expect_refusal(recorded_simulation(), {.from = kFrom, .to = kTo, .reduction_file = {}},
-                 "exists already");
+  expect_refusal(recorded_simulation(), {.from = kFrom, .to = kTo}, "exists already");
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
 #include "tests/support/program_fixture.h"
@@ -60,89 +59,12 @@ TEST_F(ReduceProgram, SaysEachMistakeInOneLine) {
   says({"lattice"}, 3, "lattice: has no tets, which a reduced model needs");
   says({"liver", "--modes", "65"}, 2, "--modes: 65 is not from 1 to 64");
   says({"liver", "--force", "-1"}, 2, "--force: must be above 0");
-  says({"liver", "--method", "magic"}, 2, "--method");
   says({"liver", "--check", "1"}, 2, "--check-creep: at most as many as --check");
   says({at("none.organ")}, 3, "none.organ");
   EXPECT_FALSE(std::filesystem::is_regular_file(at("nothing")));
   EXPECT_EQ(run({"reduce", "liver", "--results", at("out"), "--out", at("none/liver.reduction")}),
             5);
   expect_line("none/liver.reduction: cannot be written, its folder is not there");
-}
-
-TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
-  ASSERT_EQ(run({"make", "liver", "--tets", "1000", "--out", at("small.organ")}), 0) << log();
-  const auto make = [&](const char* threads, const char* out) {
-    return run({"reduce",          at("small.organ"),
-                "--method",        "local",
-                "--patches",       "2",
-                "--patch-radius",  "25",
-                "--modes",         "12",
-                "--inertia-modes", "3",
-                "--directions",    "2",
-                "--field-nodes",   "4",
-                "--force",         "0.2",
-                "--check",         "2",
-                "--threads",       threads,
-                "--out",           at(out),
-                "--results",       at("out")});
-  };
-  ASSERT_EQ(make("1", "small.reduction"), 0) << log();
-  const auto text = log();
-  EXPECT_NE(text.find("2 patches of "), std::string::npos) << text;
-  EXPECT_NE(text.find("loads at places at least 8 mm from all of these"), std::string::npos)
-      << text;
-  const auto organ = organ::read_organ(folder_ / "small.organ");
-  ASSERT_TRUE(organ.ok());
-  const auto reduction = organ::read_local_reduction(folder_ / "small.reduction", *organ);
-  ASSERT_TRUE(reduction.ok()) << reduction.error().message;
-  EXPECT_EQ(reduction->patches.size(), 2u);
-  EXPECT_EQ(reduction->patches[0].modes.size(), 15u);
-  EXPECT_EQ(reduction->force_n, 0.2);
-  EXPECT_GT(read(folder_ / "out" / "local.csv").size(), 100u);
-  ASSERT_EQ(make("2", "again.reduction"), 0) << log();
-  EXPECT_EQ(read(folder_ / "again.reduction"), read(folder_ / "small.reduction"));
-  ASSERT_TRUE(reduction->force_error.has_value());
-  EXPECT_LT(*reduction->force_error, organ::kTrueForceError);
-  // Options of one method are not of the other.
-  EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--tangents", "3"}), 2);
-  expect_line("--tangents: is of --method dogan");
-  EXPECT_EQ(run({"reduce", "liver", "--patches", "3"}), 2);
-  expect_line("--patches: is of --method local");
-  EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--residual", "0.5"}), 2);
-  expect_line("--residual: must be from 0 to 0.1");
-}
-
-// Under forty times the force of the test above, nodes move so far that no few fields follow.
-TEST_F(ReduceProgram, RefusesALocalReductionThatIsNotTrue) {
-  ASSERT_EQ(run({"make", "liver", "--tets", "1000", "--out", at("small.organ")}), 0) << log();
-  const auto make = [&](std::vector<std::string> more) {
-    std::vector<std::string> arguments{"reduce",          at("small.organ"),
-                                       "--method",        "local",
-                                       "--patches",       "2",
-                                       "--patch-radius",  "25",
-                                       "--modes",         "12",
-                                       "--inertia-modes", "3",
-                                       "--directions",    "2",
-                                       "--field-nodes",   "4",
-                                       "--force",         "8",
-                                       "--check",         "2",
-                                       "--out",           at("small.reduction"),
-                                       "--results",       at("out")};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run(arguments);
-  };
-  EXPECT_EQ(make({}), 1) << log();
-  EXPECT_NE(log().find("small.reduction: is not written, for contact forces err by "),
-            std::string::npos)
-      << log();
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "small.reduction"));
-  // Whoever wants it all the same has it at once, and the file says how it is.
-  ASSERT_EQ(make({"--resume", "--accept-error", "1000"}), 0) << log();
-  const auto organ = organ::read_organ(folder_ / "small.organ");
-  ASSERT_TRUE(organ.ok());
-  const auto reduction = organ::read_local_reduction(folder_ / "small.reduction", *organ);
-  ASSERT_TRUE(reduction.ok()) << reduction.error().message;
-  EXPECT_GT(reduction->force_error.value_or(0), organ::kTrueForceError);
 }
 
 TEST_F(ReduceProgram, HelpTeachesTheMethod) {

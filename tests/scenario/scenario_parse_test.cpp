@@ -137,8 +137,6 @@ INSTANTIATE_TEST_SUITE_P(
             "is for boundary = \"graded\" or like = \"session\", remove it"},
         Bad{"unknown_far_field", "like = \"session\"\nfar_field = \"quadratic\"", "run.far_field",
             "linear"},
-        Bad{"no_reduction", "like = \"session\"\nreduction = \"missing.reduction\"",
-            "run.reduction", "sessions of lattice can have no reduction"},
         Bad{"no_such_tool", "[[probe]]\nquantity = \"force\"\ntool = 0", "probe[0].tool",
             "there are 0"},
         Bad{"odd_rate", "[[probe]]\nset = \"top\"\nquantity = \"velocity\"\nrate_hz = 300",

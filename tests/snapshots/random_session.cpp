@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "common/base/assert.h"
 #include "server/organs/catalogue/builtin_organs.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::testing {
 namespace {
@@ -46,7 +43,7 @@ SnapshotFigures& SnapshotFigures::operator+=(const SnapshotFigures& other) {
   snapshots += other.snapshots, bytes += other.bytes;
   in_a_cut += other.in_a_cut, cut += other.cut, after_a_tear += other.after_a_tear;
   self_contact += other.self_contact, grasp += other.grasp, push += other.push;
-  mark += other.mark, reduced += other.reduced, ticks_continued += other.ticks_continued;
+  mark += other.mark, ticks_continued += other.ticks_continued;
   return *this;
 }
 
@@ -127,34 +124,15 @@ SnapshotScene loaded_scene(std::uint64_t seed) {
   return scene;
 }
 
-SnapshotScene reduced_scene(std::size_t patch) {
-  const std::filesystem::path folder = TROCAR_SOURCE_DIR "/tests/step/reduced_block";
-  auto organ = organ::read_organ(folder / "reduced_block.organ");
-  TROCAR_ASSERT(organ.ok());
-  auto local = organ::read_session_reduction(folder / "reduced_block.reduction", *organ);
-  TROCAR_ASSERT(local.ok());
-  const auto home = local->patches.at(patch).centre;
-  return {.organ = std::move(*organ),
-          .reduction = std::make_shared<const organ::LocalReduction>(std::move(*local)),
-          .reach_m = 0.012f,
-          .home = home,
-          .is_gentle = true};
-}
-
 RandomSession::RandomSession(SnapshotScene scene, std::uint64_t seed)
-    : simulation_(std::move(scene.organ), 1, reduction::at_work(std::move(scene.reduction)), {},
-                  std::move(scene.loads)),
+    : simulation_(std::move(scene.organ), 1, {}, std::move(scene.loads)),
       reach_m_(scene.reach_m),
-      is_gentle_(scene.is_gentle),
       random_(seed),
       hands_(kHands) {
   for (std::size_t i = 0; i < hands_.size(); ++i)
-    hands_[i].work = is_gentle_ ? Work::Finger
-                     : i < 2    ? Work::Scalpel
-                     : i == 2   ? Work::Forceps
-                                : Work::Finger;
+    hands_[i].work = i < 2 ? Work::Scalpel : i == 2 ? Work::Forceps : Work::Finger;
   const auto& nodes = simulation_.state().world.surface_nodes;
-  home_ = scene.home.value_or(nodes[random_.below(static_cast<std::uint32_t>(nodes.size()))]);
+  home_ = nodes[random_.below(static_cast<std::uint32_t>(nodes.size()))];
 }
 
 RandomSession::~RandomSession() = default;
@@ -186,8 +164,7 @@ void RandomSession::plan(Hand& hand, Tick now) {
   NodeIndex b = any_surface_node();
   for (int tries = 0; tries < 30 && length(at(b) - at(a)) > 0.07f; ++tries) b = any_surface_node();
   const Vec3f out = out_of(a);
-  const auto depth = static_cast<float>(is_gentle_ ? random_.between(0.0003, 0.002)
-                                                   : random_.between(0.003, 0.02));
+  const auto depth = static_cast<float>(random_.between(0.003, 0.02));
   const Vec3f away = at(a) + out * 0.03f;
   const auto orientation = rotation_from_z(out);
   using enum tool::Verb;
@@ -253,7 +230,7 @@ tool::ToolShape RandomSession::random_edge() {
 void RandomSession::make_inputs() {
   const Tick now = simulation_.current_tick() + 1;
   inputs_.clear();
-  for (std::uint8_t i = 0; i < (is_gentle_ ? 1 : kHands); ++i) {
+  for (std::uint8_t i = 0; i < kHands; ++i) {
     auto& hand = hands_[i];
     if (!hand.is_present) {
       if (now > 1 && random_.below(100) != 0) continue;
@@ -293,7 +270,6 @@ void RandomSession::make_inputs() {
   decisions_.sweeps = 3 + random_.below(4);
   decisions_.far_interval = 1 + random_.below(3);
   decisions_.is_far_exact = random_.below(4) == 0;
-  decisions_.is_reduction_off = random_.below(6) == 0;
   decisions_.waiting_blades = decisions_.node_limit % 4 == 0 ? decisions_.node_limit / 4 % 16 : 0;
 }
 
@@ -305,7 +281,6 @@ void RandomSession::count_state() {
   figures_.after_a_tear += torn_m2_ > 0;
   figures_.self_contact += !state.self_contacts.nodes().empty();
   figures_.mark += state.marks.is_set();
-  figures_.reduced += simulation_.context().report.solve.figures.is_reduced();
   bool has_cut = false, has_grasp = false, has_push = false;
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if (!state.claims.is_in_effect(ToolSlot{i})) continue;

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "server/organs/organ/local_reduction.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/support/random.h"
 
@@ -26,8 +25,7 @@ struct SnapshotFigures {
   std::uint64_t after_a_tear = 0;
   std::uint64_t self_contact = 0;  // pairs of tissue in contact
   std::uint64_t grasp = 0, push = 0;
-  std::uint64_t mark = 0;     // a mark was set
-  std::uint64_t reduced = 0;  // a patch of the reduction acted
+  std::uint64_t mark = 0;  // a mark was set
   std::uint64_t ticks_continued = 0;
 
   SnapshotFigures& operator+=(const SnapshotFigures& other);
@@ -35,21 +33,14 @@ struct SnapshotFigures {
 
 struct SnapshotScene {
   organ::Organ organ;
-  std::shared_ptr<const organ::LocalReduction> reduction;  // or null
   step::LoadRules loads = {};
   // Hands stay this near to a place, m; 0: they go everywhere.
   float reach_m = 0;
-  // The place is this node; without: any of the surface.
-  std::optional<NodeIndex> home = std::nullopt;
-  // One hand presses softly, so that a reduction need not give way.
-  bool is_gentle = false;
 };
 SnapshotScene random_scene(SnapshotOrgan organ, std::uint64_t seed);
 // Returns a liver of which one part is drawn to and fro, another is held along some axes, and a
 // third is pulled at.
 SnapshotScene loaded_scene(std::uint64_t seed);
-// Returns the block of tests/step/reduced_block with its reduction, pressed softly near a patch.
-SnapshotScene reduced_scene(std::size_t patch);
 
 class RandomSession {
  public:
@@ -90,7 +81,6 @@ class RandomSession {
 
   step::Simulation simulation_;
   const float reach_m_;
-  const bool is_gentle_;
   NodeIndex home_;
   Random random_;
   std::vector<Hand> hands_;

@@ -24,9 +24,9 @@ struct Row {
 void print(const Row& row) {
   const auto& f = row.figures;
   std::printf("| %s | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64
-              " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " |\n",
+              " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " |\n",
               row.name.c_str(), row.sessions, f.snapshots, f.ticks_continued, f.in_a_cut, f.cut,
-              f.after_a_tear, f.self_contact, f.grasp, f.reduced, row.failures);
+              f.after_a_tear, f.self_contact, f.grasp, row.failures);
   std::fflush(stdout);
 }
 
@@ -34,11 +34,10 @@ int run(int argc, char** argv) {
   CLI::App app{"Writes states of random sessions, reads them and goes on from them.",
                "snapshot_campaign"};
   std::uint64_t count = 2000, seed = 1;
-  bool has_large = true, has_reduction = true;
+  bool has_large = true;
   app.add_option("--count", count, "states in all")->capture_default_str();
   app.add_option("--seed", seed, "of the first session")->capture_default_str();
   app.add_flag("!--no-large", has_large, "leave out the stomach and the chest");
-  app.add_flag("!--no-reduction", has_reduction, "leave out the session with a reduction");
   CLI11_PARSE(app, argc, argv);
 
   std::vector<Row> rows;
@@ -50,14 +49,11 @@ int run(int argc, char** argv) {
                     [organ](std::uint64_t of_session) { return random_scene(organ, of_session); }});
   }
   rows.push_back({"liver with loads", loaded_scene});
-  if (has_reduction)
-    rows.push_back({"block with a reduction",
-                    [](std::uint64_t of_session) { return reduced_scene(of_session % 2); }});
 
   std::printf(
       "| scene | sessions | states | ticks continued | in a cut | cut | torn | "
-      "self-contact | grasp | reduced | failures |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "self-contact | grasp | failures |\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n");
   std::uint64_t failures = 0;
   for (auto& row : rows) {
     const std::uint64_t wanted = (count + rows.size() - 1) / rows.size();

@@ -6,13 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <memory>
 
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 #include "tests/contact/folded_organ.h"
 #include "tests/step/hands.h"
 
@@ -31,12 +28,11 @@ struct Golden {
   std::function<bool(const Simulation&, const TickReport&)> has_happened;
   std::uint64_t hash = 0;
   TickDecisions decisions = {};
-  std::shared_ptr<const organ::LocalReduction> reduction = nullptr;
 };
 
 void expect_golden(const Golden& golden) {
   for (const unsigned workers : {1u, 3u}) {
-    Simulation simulation(golden.organ, workers, reduction::at_work(golden.reduction));
+    Simulation simulation(golden.organ, workers);
     bool has_happened = false;
     for (Tick tick = 1; tick <= static_cast<Tick>(golden.ticks); ++tick) {
       hands::TickInputs inputs;
@@ -213,44 +209,6 @@ TEST(Golden, SelfContact) {
                        return simulation.state().self_contacts.nodes().size() > 20;
                      },
                  .hash = 5950077142286914052u});
-}
-
-// The organ and its reduction are read from files, because making a reduction is not bound to the
-// last bit: see reduced_block.toml.
-TEST(Golden, LocalReduction) {
-  const std::filesystem::path folder = TROCAR_SOURCE_DIR "/tests/step/reduced_block";
-  const auto organ = organ::read_organ(folder / "reduced_block.organ");
-  ASSERT_TRUE(organ.ok()) << organ.error().message;
-  auto local = organ::read_session_reduction(folder / "reduced_block.reduction", *organ);
-  ASSERT_TRUE(local.ok()) << local.error().message;
-  const auto reduction = std::make_shared<const organ::LocalReduction>(std::move(*local));
-  // Presses one patch, goes to the other while it is down, and leaves.
-  const auto place_of = [&](std::size_t patch) {
-    return to_float(organ->mesh.rest_positions[reduction->patches[patch].centre.value]);
-  };
-  const auto press = [first = place_of(0), second = place_of(1)](Tick tick,
-                                                                 hands::TickInputs& inputs) {
-    if (tick == 1) join(0, {.radius_m = 0.012f, .length_m = 0.2f, .reach_m = 0.012f}, inputs);
-    if (tick % 8 != 1) return;
-    const auto share = [tick](float begin, float length) {
-      return std::clamp((static_cast<float>(tick) - begin) / length, 0.0f, 1.0f);
-    };
-    const float height = 0.003f - 0.005f * share(0, 100) + 0.006f * share(300, 50);
-    const Vec3f tip = first + (second - first) * share(120, 150) + Vec3f{0, height, 0};
-    inputs.samples.push_back(
-        {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, tool::Verb::Push}});
-  };
-  int reduced_ticks = 0;
-  expect_golden({.organ = *organ,
-                 .ticks = 400,
-                 .hands = press,
-                 .has_happened =
-                     [&](const Simulation&, const TickReport& report) {
-                       reduced_ticks += report.solve.figures.is_reduced() ? 1 : 0;
-                       return reduced_ticks > 100;
-                     },
-                 .hash = 2121086452041928991u,
-                 .reduction = reduction});
 }
 
 }  // namespace

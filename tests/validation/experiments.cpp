@@ -1,7 +1,5 @@
 #include "tests/validation/experiments.h"
 
-#include "tests/validation/live_experiments.h"
-
 namespace trocar::validation {
 
 const std::vector<Experiment>& experiments() {
@@ -39,16 +37,6 @@ const std::vector<Experiment>& experiments() {
        run_dogan_live},
       {"dogan2011/reduction", "A reduced liver beside the full one",
        "Dogan 2011, equations 6 to 14, figures 3 to 7", run_dogan_reduction},
-      {"ours/local-reduction", "A reduced liver that stays close to contacts",
-       "Dogan 2011's reduced model; full solve, our own", run_local_reduction},
-      {"ours/live-reduction/sessions", "A local reduction at work in sessions",
-       "converged solution, our own", run_live_reduction_sessions},
-      {"ours/live-reduction/hand-over", "Hand-over between the full and the reduced solver",
-       "full solver throughout, our own", run_live_reduction_hand_over},
-      {"ours/live-reduction/estimate", "What a local reduction knows of its error",
-       "converged solution, our own", run_live_reduction_estimate},
-      {"ours/live-reduction/sizes", "When a local reduction pays",
-       "full solver and converged solution, our own", run_live_reduction_sizes},
       {"ours/feel", "What a hand feels over a network", "the same organ without delay, our own",
        run_feel},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",

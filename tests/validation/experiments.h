@@ -37,7 +37,6 @@ void run_locking(const Lab& lab, Section& section);
 void run_dogan_creep(const Lab& lab, Section& section);
 void run_dogan_live(const Lab& lab, Section& section);
 void run_dogan_reduction(const Lab& lab, Section& section);
-void run_local_reduction(const Lab& lab, Section& section);
 
 void run_feel(const Lab& lab, Section& section);
 

@@ -110,7 +110,7 @@ TEST_F(Validation, CountsAreThoseOfThePaper) {
   EXPECT_TRUE(fs::exists(out() / "scenarios" / "eq2-surface-10.toml"));
 }
 
-// One process per entry: experiments that train the same reductions share one.
+// One process per entry.
 struct Family {
   const char* prefix;  // as --only takes it
   const char* title;   // of the test
@@ -135,8 +135,6 @@ constexpr Family kFamilies[] = {
     {"dogan2011/creep", "DoganCreep", "liver-live"},
     {"dogan2011/live", "Live", "liver-averaged-force"},
     {"dogan2011/reduction", "Reduction", "liver-own-load-best"},
-    {"ours/local-reduction", "LocalReduction", "liver-2-layers-unseen-force"},
-    {"ours/live-reduction", "LiveReduction", nullptr},
     {"ours/feel", "Feel", "100-ms-1-hz"},
     {"ours/propagation-lattice", "PropagationLattice", "lattice-with-diagonals-graded"},
     {"ours/propagation-liver-4k", "PropagationLiver", "liver-4k-graded"},

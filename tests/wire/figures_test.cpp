@@ -25,14 +25,9 @@ FrameFigures distinct_figures() {
     set(active_nodes, queue_nodes, node_limit, region_count);
   }
   {
-    auto& [sweeps, far_sweeps, far_interval, layer_sweeps, residual_n, solver] = solve;
+    auto& [sweeps, far_sweeps, far_interval, layer_sweeps, residual_n] = solve;
     set(sweeps, far_sweeps, far_interval, residual_n);
     for (auto& count : layer_sweeps) set(count);
-    auto& [is_reduced, reason, patches, estimate, largest_node_force_n] = solver.emplace();
-    is_reduced = true;
-    reason = SolverReason::Preparing;
-    set(estimate, largest_node_force_n);
-    for (const std::uint32_t patch : {3u, 0u, 12u}) EXPECT_TRUE(patches.add(patch));
   }
   {
     auto& [energy_j, volume_change, relaxed_share] = relaxation.emplace();
@@ -65,11 +60,6 @@ TEST(figures, every_one_is_carried) {
   const auto figures = distinct_figures();
   EXPECT_EQ(carried(figures), figures);
   EXPECT_EQ(carried({}), FrameFigures{});
-  for (std::uint8_t i = 0; i < kSolverReasons; ++i) {
-    auto with_reason = figures;
-    with_reason.solve.solver->reason = static_cast<SolverReason>(i);
-    EXPECT_EQ(carried(with_reason), with_reason) << int{i};
-  }
   for (std::size_t i = 0; i < kRateLevels; ++i) {
     auto with_level = figures;
     with_level.pace.rate.level = static_cast<RateLevel>(i);
@@ -103,23 +93,15 @@ TEST(figures, of_an_older_server_are_as_by_default) {
   EXPECT_EQ(*figures, FrameFigures{});
 }
 
-TEST(figures, levels_and_reasons_of_a_newer_server_are_not_told) {
+TEST(figures, levels_of_a_newer_server_are_not_told) {
   proto::FrameState message;
   write(distinct_figures(), message);
   auto expected = distinct_figures();
-  expected.solve.solver->reason = SolverReason::None;
   expected.pace.rate.level = RateLevel::Fixed;
   for (const int newer : {10, 1000, -1}) {
-    message.mutable_solver()->set_reason(static_cast<proto::SolverReason>(newer));
     message.mutable_rate()->set_level(static_cast<proto::RateLevel>(newer));
     EXPECT_EQ(*read(message), expected) << newer;
   }
-}
-
-TEST(figures, an_estimate_without_bounds_is_written_as_a_number) {
-  auto figures = distinct_figures();
-  figures.solve.solver->estimate = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(carried(figures).solve.solver->estimate, std::numeric_limits<float>::max());
 }
 
 TEST(figures, what_cannot_be_is_refused_by_its_field) {
@@ -135,24 +117,8 @@ TEST(figures, what_cannot_be_is_refused_by_its_field) {
             "FrameState.rate: there are over 4 layers");
   EXPECT_EQ(error_of([](auto& m) { m.mutable_rate()->set_budget_us(-1); }),
             "FrameState.rate: a time is negative or not finite");
-  EXPECT_EQ(error_of([](auto& m) { m.mutable_solver()->add_patch(0); }),
-            "FrameState.solver: a patch has the number 0, or there are over 4");
-  EXPECT_EQ(error_of([](auto& m) {
-              for (const std::uint32_t patch : {21u, 22u}) m.mutable_solver()->add_patch(patch);
-            }),
-            "FrameState.solver: a patch has the number 0, or there are over 4");
-  EXPECT_EQ(error_of([](auto& m) { m.mutable_solver()->set_largest_node_force_n(kNan); }),
-            "FrameState.solver: a number is negative or not finite");
   EXPECT_EQ(error_of([](auto& m) { m.mutable_relaxation()->set_relaxed_share(kNan); }),
             "FrameState.relaxation: a number is not finite");
-}
-
-TEST(figures, people_count_patches_from_one) {
-  PatchSet patches;
-  EXPECT_TRUE(patches.add(11));
-  EXPECT_EQ(name_of(patches), "patch 12");
-  EXPECT_TRUE(patches.add(2));
-  EXPECT_EQ(name_of(patches), "patches 3 + 12");
 }
 
 }  // namespace

@@ -190,8 +190,8 @@ PARTS = {part.name: part for part in (
     Part("cuts", cuts, 0.5, "10,000 random cuts of five organs in fresh series of 1 to 100: after each the mesh must "
          "be sound, and in all the wounds as large as what was swept; one table. Goes on where it was stopped",
          options=("cuts", "organs"), length="cuts", amount=10000),
-    Part("snapshots", snapshots, 0.5, "4,000 states of random sessions in eight scenes, cut, torn, held, loaded, "
-         "reduced: each must be read again and go on bit for bit; one table",
+    Part("snapshots", snapshots, 0.5, "4,000 states of random sessions in seven scenes, cut, torn, held, "
+         "loaded: each must be read again and go on bit for bit; one table",
          options=("count", "seed"), length="count", amount=4000),
     Part("faults", faults, 0.5, "servers and clients killed, stopped, without disk and with a clock that jumps: 200 "
          "recordings cut short, one session resumed 20 times; each promise of the documents is checked",

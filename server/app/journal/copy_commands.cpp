@@ -70,14 +70,11 @@ void add_options(CLI::App& command, TrimCommand& options) {
       ->capture_default_str();
   command.add_option("--to", options.to_s, "in s of the session; the end without it")
       ->check(from_to(0, kMostSeconds));
-  command.add_option("--reduction", options.reduction_file, "of the session, if it had one")
-      ->type_name("FILE");
 }
 
 int trim_recording(const TrimCommand& options) {
   recording::TrimOptions asked{.from = ticks_of(options.from_s),
-                               .to = ticks_of(options.to_s.value_or(kMostSeconds)),
-                               .reduction_file = options.reduction_file};
+                               .to = ticks_of(options.to_s.value_or(kMostSeconds))};
   const auto kept = recording::trim(options.file, options.to, asked);
   if (!kept) return report(kProgram, kept.error());
   std::printf("%s: %" PRIu64 " messages, from %.3f s to %.3f s of %s\n", options.to.c_str(),

@@ -20,7 +20,7 @@ void add_options(CLI::App& command, MergeOptions& options);
 int merge_parts(const MergeOptions& options);
 
 struct TrimCommand {
-  std::string file, to, reduction_file;
+  std::string file, to;
   double from_s = 0;
   std::optional<double> to_s;  // nothing: its end
 };

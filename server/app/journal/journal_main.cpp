@@ -62,7 +62,6 @@ Json json_of(const journal::SessionInfo& info, const journal::McapReader& mcap) 
           {"gap_messages", info.gap_messages},
           {"external_loads", info.has_external_loads},
           {"starts_from_snapshot", info.starts_from_snapshot},
-          {"reduction_hash", info.reduction ? Json(hex64(info.reduction->hash)) : Json()},
           {"channels", channels}};
 }
 
@@ -79,9 +78,6 @@ int show_info(const std::string& path, bool as_json) {
   std::printf("  %s\n", info.summary.c_str());
   std::printf("  organ        %s (hash %016" PRIx64 ")\n", info.organ_name.c_str(),
               info.organ_hash);
-  if (info.reduction)
-    std::printf("  reduction    %s (hash %016" PRIx64 "): %s\n", info.reduction->file.c_str(),
-                info.reduction->hash, info.reduction->source.c_str());
   std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds_of(info),
               info.last_tick - info.begin_tick());
   if (info.continues)
@@ -172,22 +168,18 @@ Status check_owner(const std::string& path, const std::string& key_file) {
   return journal::check_signature(**reader, *key, key_file);
 }
 
-int verify(const std::string& path, const std::string& reduction_file, const std::string& key_file,
-           bool as_json) {
+int verify(const std::string& path, const std::string& key_file, bool as_json) {
   if (!key_file.empty())
     if (auto fine = check_owner(path, key_file); !fine) return report(kProgram, fine.error());
   const std::uint64_t started = monotonic_ns();
   const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
   bool is_progress_shown = false;
-  auto verified = recording::verify_journal(
-      path,
-      [&](Tick tick, Tick last) {
-        if (!is_terminal || as_json || monotonic_ns() - started < 2'000'000'000u) return;
-        is_progress_shown = true;
-        std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
-                     last / kTicksPerSecond);
-      },
-      reduction_file);
+  auto verified = recording::verify_journal(path, [&](Tick tick, Tick last) {
+    if (!is_terminal || as_json || monotonic_ns() - started < 2'000'000'000u) return;
+    is_progress_shown = true;
+    std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
+                 last / kTicksPerSecond);
+  });
   if (is_progress_shown) std::fprintf(stderr, "\n");
   if (!verified) return report(kProgram, verified.error());
   if (as_json) {
@@ -257,9 +249,6 @@ int run(int argc, char** argv) {
       "Examples:\n"
       "  trocar-journal info out/demo/session.mcap     who, how long, which channels\n"
       "  trocar-journal verify out/demo/session.mcap   simulate again, name the first difference\n"
-      "  trocar-journal verify session.mcap --reduction liver.reduction\n"
-      "                                                the same for a session that had a "
-      "reduction\n"
       "  trocar-journal export session.mcap --forces forces.csv\n"
       "                                                forces of tools and hands as a table\n"
       "  trocar-journal export session.mcap --lesson lesson.csv\n"
@@ -343,14 +332,12 @@ int run(int argc, char** argv) {
   SignCommand sign_command;
   auto* seal = app.add_subcommand("sign", "Write a recording again with a signature");
   add_options(*seal, sign_command);
-  std::string reduction_file, owner_file;
+  std::string owner_file;
   check
       ->add_option("--check", owner_file,
                    "public Ed25519 key (PEM): before all else, whether its owner signed the "
                    "recording as it is")
       ->type_name("KEY");
-  check->add_option("--reduction", reduction_file, "of the session, if it had one")
-      ->type_name("FILE");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -375,8 +362,7 @@ int run(int argc, char** argv) {
     const int forces = force_table.empty() ? 0 : export_forces(path, force_table);
     return forces != 0 || lesson_table.empty() ? forces : export_lesson(path, lesson_table);
   }
-  return check->parsed() ? verify(path, reduction_file, owner_file, as_json)
-                         : show_info(path, as_json);
+  return check->parsed() ? verify(path, owner_file, as_json) : show_info(path, as_json);
 }
 
 }  // namespace

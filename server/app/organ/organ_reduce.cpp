@@ -10,7 +10,6 @@
 #include "common/base/timing.h"
 #include "common/base/writable.h"
 #include "common/plot/plot.h"
-#include "server/app/organ/organ_reduce_local.h"
 #include "server/app/organ/program_name.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
@@ -20,15 +19,14 @@
 namespace trocar::app {
 namespace {
 
+constexpr std::size_t kMaxCheckPlaces = 500;
+
 using dogan::Quality;
 using dogan::Stage;
 
 constexpr const char* kHelp = R"(
-Methods:
-  dogan  Dogan 2011: a few Karhunen-Loeve modes of the whole organ and a constant tangent
-  local  a model that stays close to a contact, wherever it is on the surface
-
-What dogan does (sections on model reduction and results):
+Dogan 2011: a few Karhunen-Loeve modes of the whole organ and a constant tangent. What it does
+(sections on model reduction and results):
   1. The full model (off-line solver, linear tets) is pressed at --places of the surface, in
      --directions, with forces up to --force. Each solution is a snapshot.
   2. The snapshots' first --modes Karhunen-Loeve modes B are the reduced model's unknowns.
@@ -39,21 +37,7 @@ What dogan does (sections on model reduction and results):
   Expect errors of tens of per cent, and more at the loaded node: the reduced model is linear,
   tissue is not, and a press is local. More modes do not cure it.
 
-What local does:
-  1. The surface is covered with patches of --patch-radius. For each of their nodes the organ's
-     displacements under unit forces there are found, and kept.
-  2. Each patch's centre is pressed in --directions with forces up to --force.
-  3. A patch gets --modes: the first Karhunen-Loeve modes of these presses, of the unit forces'
-     fields and of fields of second order around it; and --inertia-modes of what inertia adds to
-     these, and --vibrations, for contacts that move.
-  4. Where a node is touched, the unknowns are all these, its own fields, and the displacements of
-     nodes within --free-layers of it. Tets around a patch stay as they are; what is not linear in
-     the others is summed over a few, with weights that leave --residual.
-  Expect errors of a few per cent anywhere, at once; in sessions tissue relaxes as without it.
-
-Both are compared with the full model on loads outside the training. A file of local whose contact
-forces err by more than --accept-error in 5 of 100 of these is not written. Sessions take files of
-local: trocar-server --reduction FILE.
+It is compared with the full model on loads outside the training.
 
 Examples:
   trocar-organ reduce liver
@@ -62,10 +46,6 @@ Examples:
       more modes, a denser training
   trocar-organ reduce liver --places 6 --directions 1 --creep-nodes 0
       a quick try without creep
-  trocar-organ reduce liver --method local --threads 2
-      the whole surface; the better part of an hour
-  trocar-organ reduce liver --method local --patches 4 -o try.reduction
-      a quick try: some patches beside each other
 )";
 
 const char* name_of(Stage stage) {
@@ -335,16 +315,11 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   sub->footer(kHelp);
   sub->add_option("ORGAN", command.organ, ".organ or .msh file, or a built-in organ's name")
       ->required();
-  command.app = sub;
-  sub->add_option("--method", command.method,
-                  "dogan: constant tangent, creep by scaling; local: close to contacts, see below")
-      ->check(CLI::IsMember({"dogan", "local"}))
-      ->capture_default_str();
   auto& s = command.settings;
   const auto number = [&](const char* name, auto& value, const char* what, const char* unit) {
     sub->add_option(name, value, what)->type_name(unit)->capture_default_str();
   };
-  number("--modes", s.modes, "unknowns of the reduced model, 1 to 64; local: of a patch [12]", "N");
+  number("--modes", s.modes, "unknowns of the reduced model, 1 to 64", "N");
   sub->add_option("-o,--out", command.out, "file to write [<organ>.reduction, here]")
       ->type_name("FILE");
   sub->add_option("--results", command.folder,
@@ -352,7 +327,7 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
       ->type_name("DIR");
   number("--places", s.places, "of the surface that are pressed", "N");
   number("--directions", s.directions,
-         "of the force at each place: straight, aslant, every fifth pulls; local: [5]", "N");
+         "of the force at each place: straight, aslant, every fifth pulls", "N");
   number("--magnitudes", s.magnitudes, "of the force in each direction, equal parts", "N");
   number("--force", s.force_n, "the largest", "NEWTON");
   number("--radius", command.radius_mm, "of the patch that is pressed; 0: single nodes", "MM");
@@ -364,39 +339,17 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--check", command.check_places,
          "places outside the training at which the result is compared; 0: none", "N");
   number("--check-creep", command.check_creep, "of these at which creep is compared, too", "N");
-  auto& l = command.local;
-  number("--patch-radius", command.patch_radius_mm, "local: of the patches of the surface", "MM");
-  number("--inertia-modes", l.inertia_modes,
-         "local: of a patch, of what inertia adds to forces that change; 0: none", "N");
-  number("--vibrations", l.vibrations, "local: of the organ, the slowest; all patches share them",
-         "N");
-  number("--free-layers", l.free_layers, "local: of nodes around a touched one, 0 to 3", "N");
-  number("--field-nodes", l.field_nodes, "local: whose fields a patch's modes are of", "N");
-  number("--residual", l.residual, "local: what weighted tets may leave of the forces; 0: all tets",
-         "SHARE");
-  number("--patches", l.patches, "local: made at most, from the first outwards; 0: all", "N");
-  number("--accept-error", command.accepted_percent,
-         "local: a file whose check finds more than this error of contact forces is not written",
-         "PERCENT");
-  sub->add_flag("--resume", command.is_resumed,
-                "local: go on from the parts beside the file that an interrupted run has left");
   number("--seed", s.seed, "chooses the first place", "S");
   number("--threads", s.threads, "of the full model", "N");
 }
 
 Status run_reduce(ReduceCommand command) {
-  if (command.method == "local") return run_reduce_local(std::move(command));
-  for (const char* option :
-       {"--patch-radius", "--inertia-modes", "--vibrations", "--free-layers", "--field-nodes",
-        "--residual", "--patches", "--resume", "--accept-error"})
-    if (command.app->count(option) > 0)
-      return Error{ErrorCode::Usage, std::string(option) + ": is of --method local"};
   command.settings.radius_m = command.radius_mm * 1e-3;
   command.settings.influence_m = command.influence_mm * 1e-3;
   if (auto s = validate(command); !s) return s;
   auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
-  organ::use_plain_strain(*organ);  // as sessions with a reduction do
+  organ::use_plain_strain(*organ);
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
       command.folder.empty() ? "out/reduce-" + stem : command.folder;

@@ -7,23 +7,15 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/lab/reduce/local_build.h"
 #include "server/papers/dogan/build.h"
 
 namespace trocar::app {
 
-inline constexpr std::size_t kMaxCheckPlaces = 500;
-
 struct ReduceCommand {
-  std::string organ, out, folder, method = "dogan";
+  std::string organ, out, folder;
   double radius_mm = 15, influence_mm = 45;
   std::size_t check_places = 12, check_creep = 2;
   dogan::Settings settings;
-  double patch_radius_mm = 12;
-  bool is_resumed = false;
-  double accepted_percent = 100 * organ::kTrueForceError;  // of the contact force, by the check
-  reduce::LocalSettings local;
-  CLI::App* app = nullptr;
 };
 void add_reduce_command(CLI::App& app, ReduceCommand& command);
 Status run_reduce(ReduceCommand command);

@@ -9,7 +9,6 @@
 #include "server/app/server/admission.h"
 #include "server/app/server/session_start.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/session/monitoring/figures_server.h"
 #include "server/session/net/tcp_server.h"
 
@@ -32,9 +31,7 @@ Status check_organ(const ServerOptions& options,
   if (!organ) return of("organ", organ.error());
   if (const auto chosen = choose_strain(options, *organ); !chosen)
     return of("averaged-strain", chosen);
-  if (options.reduction_file.empty()) return {};
-  const auto reduction = organ::read_session_reduction(options.reduction_file, *organ);
-  return reduction ? Status() : of("reduction", reduction.error());
+  return {};
 }
 
 }  // namespace

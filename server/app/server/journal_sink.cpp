@@ -35,12 +35,10 @@ class RecordedSession : public JournalSink {
 
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction,
     const std::optional<journal::Continuation>& continues,
     const std::optional<bleeding::Rules>& bleeding, const std::optional<secure::SigningKey>& key) {
   if (path == "none") return std::unique_ptr<JournalSink>();
   recording::Beginning beginning;
-  beginning.reduction = reduction;
   beginning.continues = continues;
   beginning.bleeding = bleeding;
   beginning.key = key;

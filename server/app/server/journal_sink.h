@@ -46,12 +46,10 @@ class JournalSink {
   virtual wire::RecordingState state() const = 0;
 };
 
-// A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
-// continues: with which journal's session it goes on. bleeding: of a session that bleeds. key:
-// signs the recording at its end.
+// A journal at `path`, or none for "none" (then null). continues: with which journal's session it
+// goes on. bleeding: of a session that bleeds. key: signs the recording at its end.
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction = {},
     const std::optional<journal::Continuation>& continues = {},
     const std::optional<bleeding::Rules>& bleeding = {},
     const std::optional<secure::SigningKey>& key = {});

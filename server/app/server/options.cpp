@@ -32,9 +32,6 @@ Examples:
       who came with it have to go, and with --new-code observer there is another one
   trocar-server --organ liver.organ --sweeps 6 --budget 0.6
       up to six passes, as long as a tick takes no more than 0.6 ms
-  trocar-server --organ liver --reduction liver.reduction
-      where the reduced model fits what is touched, it moves the tissue beyond; made with
-      trocar-organ reduce liver --method local
   trocar-server --resume lesson.mcap --journal lesson-2.mcap
       after a crash: goes on where that recording ends, with all cuts; people come back
   trocar-server --listen 0.0.0.0:7690 --announce "Lesson one"
@@ -188,8 +185,7 @@ void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions
   more.averaged = research->add_flag(
       "--averaged-strain", options.has_averaged_strain,
       "average the strain of its tets over nodes, so that they do not lock; =false: "
-      "plain tets, up to 50 % too stiff [as the organ has it; with --reduction "
-      "plain]");
+      "plain tets, up to 50 % too stiff [as the organ has it]");
   research->add_flag("--frozen", more.is_frozen,
                      "tissue beyond the limits stands still, as in the papers, "
                      "instead of moving with fewer sweeps");
@@ -325,13 +321,6 @@ void CommandLine::add_session_options() {
       ->capture_default_str();
   app_.add_option("--summary", options_.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
-  app_.add_option(
-          "--reduction", options_.reduction_file,
-          "local reduction of that organ (trocar-organ reduce --method local): moves the "
-          "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
-          "see the full solution as a ghost, which takes about a core meanwhile")
-      ->type_name("FILE")
-      ->group("Speed");
   app_.add_option("--workers", options_.workers, "threads that share a tick's work")
       ->check(CLI::Range(1u, kMaxWorkers))
       ->capture_default_str()

@@ -21,8 +21,7 @@ struct ServerOptions {
   std::optional<lesson::Lesson> lesson;     // read from it
   bool bleeds = false;                      // asked for, besides what a lesson says
   std::string resume_file;                  // empty: a new session
-  std::optional<bool> has_averaged_strain;  // empty: as the organ has it, and plain for a reduction
-  std::string reduction_file;               // empty: the full solver alone
+  std::optional<bool> has_averaged_strain;  // empty: as the organ has it
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
   bool is_stream_only = false;  // no datagrams

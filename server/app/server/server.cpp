@@ -37,7 +37,6 @@
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
 #include "server/session/agones/agones.h"
-#include "server/session/ghost/ghost.h"
 #include "server/session/guests/guest_connections.h"
 #include "server/session/monitoring/disk_watch.h"
 #include "server/session/monitoring/figures_server.h"
@@ -77,8 +76,7 @@ class Server {
       : options_(options),
         admission_(std::move(admission)),
         start_(std::move(start)),
-        simulation_(start_.simulation),
-        reduction_(start_.reduction) {}
+        simulation_(start_.simulation) {}
 
   // Binds the port and opens the journal.
   Status open();
@@ -94,7 +92,6 @@ class Server {
   void settle_rate();
   void announce();
   void publish_frames();
-  void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
   Status open_figures();
   Status open_sidecar();
@@ -119,7 +116,6 @@ class Server {
   const std::unique_ptr<Admission> admission_;
   SessionStart start_;
   step::Simulation& simulation_;
-  const std::optional<journal::ReductionDescription>& reduction_;
   std::unique_ptr<JournalSink> journal_;
   participants::SimulationInbox inbox_;
   asio::io_context io_{1};
@@ -136,8 +132,7 @@ class Server {
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
   step::SharedFrame newest_;
-  std::uint64_t newest_ns_ = 0;                                          // when it came
-  std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
+  std::uint64_t newest_ns_ = 0;  // when it came
   std::vector<replication::BarrierResult> barrier_;
   std::optional<Status> closed_;  // the recording, once it is
   std::string goodbye_ = "the session is over";
@@ -147,7 +142,6 @@ class Server {
   Tick next_warning_ = 0;
   double wall_seconds_ = 0;
   std::unique_ptr<SimulationLoop> loop_;  // its thread uses what stands above
-  std::unique_ptr<ghost::Ghost> ghost_;   // likewise; of sessions with a reduction
 };
 
 Status Server::open() {
@@ -177,8 +171,8 @@ Status Server::open() {
 
   const auto bleeding =
       start_.bleeding ? std::optional(start_.bleeding->rules()) : std::optional<bleeding::Rules>();
-  auto journal = open_journal(options_.journal, organ, layout, reduction_, start_.continues,
-                              bleeding, start_.key);
+  auto journal =
+      open_journal(options_.journal, organ, layout, start_.continues, bleeding, start_.key);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
@@ -218,8 +212,6 @@ Status Server::open() {
   };
   if (options_.pace > 1)
     replication.on_followed = [this](Frame frame) { loop_->note_followed(frame); };
-  if (reduction_)
-    replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
       *connections_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
   if (journal_) replicator_->set_recording(recording_state());
@@ -227,10 +219,6 @@ Status Server::open() {
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
                                            loop_options(),
                                            [this] { asio::post(io_, [this] { begin_end(); }); });
-  if (reduction_)
-    ghost_ = std::make_unique<ghost::Ghost>(
-        simulation_, ghost::GhostOptions{most_decisions(), [this] { loop_->request_snapshot(); },
-                                         [this](auto report) { show_ghost(std::move(report)); }});
   return open_figures();
 }
 
@@ -325,7 +313,7 @@ LoopOptions Server::loop_options() {
     const bool is_averaged = simulation_.state().strain_scheme == dynamics::StrainScheme::Explicit;
     if (!is_averaged) rate.far_interval = control::kLongestFarInterval;
     const bool is_asked = options_.are_sweeps_chosen || decisions.far_sweeps > 0;
-    if (!is_asked && !simulation_.state().far_model) rate.most_far_sweeps = control::kMostFarSweeps;
+    if (!is_asked) rate.most_far_sweeps = control::kMostFarSweeps;
   }
   loop.rate = rate;
   return loop;
@@ -382,20 +370,7 @@ void Server::publish_frames() {
     newest_ns_ = monotonic_ns();
   }
   replicator_->publish(frames_);
-  if (ghost_) ghost_->push(frames_);
-  for (const auto& frame : frames_)
-    for (const auto& [tick, solver] : frame->solver_changes)
-      log::debug("tick {}: solver {}", tick, replication::describe(solver));
   warn_if_slow();
-}
-
-// On the ghost's thread. Of reports that the I/O thread has not seen yet the newest counts.
-void Server::show_ghost(std::shared_ptr<const ghost::GhostReport> report) {
-  if (ghost_report_.exchange(std::move(report))) return;
-  asio::post(io_, [this] {
-    const auto newest = ghost_report_.exchange(nullptr);
-    if (!is_ending_) replicator_->publish(*newest);
-  });
 }
 
 void Server::warn_if_slow() {
@@ -495,7 +470,6 @@ std::string Server::metrics() const {
 void Server::begin_end() {
   publish_frames();
   is_ending_ = true;
-  if (ghost_) ghost_->set_wanted(false);
   ignore_ending_signals();
   announcer_.reset();
   disk_timer_.cancel();
@@ -560,7 +534,6 @@ Status Server::write_end() {
       .wall_seconds = wall_seconds_,
       .journal = journal_ ? options_.journal : "none",
       .recording = journal_ ? journal_->state() : not_recorded,
-      .reduction = reduction_,
       .frames_lost = handover_.dropped(),
       .loop = report,
       .barrier = barrier_,
@@ -569,8 +542,7 @@ Status Server::write_end() {
       .access = admission_->gate() ? admission_->gate()->counters() : access::GateCounters{},
       .tcp = tcp_->counters(),
       .datagrams = tcp_->datagram_counters(),
-      .inbox = inbox_.counters(),
-      .ghost = ghost_ ? ghost_->counters() : ghost::GhostCounters{}};
+      .inbox = inbox_.counters()};
   const auto written = write_text_file(options_.summary_file, to_json(summary));
   return closed ? written : closed;
 }

@@ -7,33 +7,14 @@
 #include "server/organs/catalogue/hidden_structures.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/session/recording/resume.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::app {
 namespace {
 
-constexpr std::uintmax_t kLongFileBytes = 50'000'000;  // takes more than a second or two
-
 double seconds_since(std::uint64_t begin_ns) {
   return static_cast<double>(monotonic_ns() - begin_ns) * 1e-9;
-}
-
-journal::ReductionDescription describe(const std::string& file,
-                                       const organ::LocalReduction& model) {
-  return {organ::reduction_hash(model), std::filesystem::path(file).filename().string(),
-          model.source};
-}
-
-// People are told where a reduction acts that is not true, or of which nobody knows.
-void tell_error(const std::string& file, const organ::LocalReduction& model) {
-  if (!model.force_error)
-    log::warn("{}: nobody has checked how far its contact forces are off", file);
-  else if (*model.force_error > organ::kTrueForceError)
-    log::warn("{}: contact forces err by {:.0f} % in 5 of 100 presses of its check", file,
-              100 * *model.force_error);
 }
 
 Result<organ::Organ> read_organ(const ServerOptions& options) {
@@ -56,25 +37,7 @@ std::optional<bleeding::Bleeding> begin_bleeding(const ServerOptions& options) {
 Result<SessionStart> begin_tissue(const ServerOptions& options) {
   auto organ = read_organ(options);
   if (!organ) return organ.error();
-  if (options.reduction_file.empty())
-    return SessionStart{.simulation = step::Simulation(std::move(*organ), options.workers)};
-  const auto begin = monotonic_ns();
-  std::error_code no_size;  // then reading says what is wrong
-  const auto file_bytes = std::filesystem::file_size(options.reduction_file, no_size);
-  if (!no_size && file_bytes > kLongFileBytes)
-    log::info("reading {}: {:.0f} MB", options.reduction_file,
-              static_cast<double>(file_bytes) * 1e-6);
-  auto read = organ::read_session_reduction(options.reduction_file, *organ);
-  if (!read) return read.error();
-  const auto model = std::make_shared<const organ::LocalReduction>(std::move(*read));
-  tell_error(options.reduction_file, *model);
-  log::info("{}: strain is not averaged, the reduction is of plain tets", options.reduction_file);
-  SessionStart start{
-      .simulation = step::Simulation(std::move(*organ), options.workers, reduction::at_work(model)),
-      .reduction = describe(options.reduction_file, *model)};
-  log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
-            model->patches.size(), static_cast<double>(file_bytes) * 1e-6, seconds_since(begin));
-  return start;
+  return SessionStart{.simulation = step::Simulation(std::move(*organ), options.workers)};
 }
 
 Result<SessionStart> begin(const ServerOptions& options) {
@@ -96,8 +59,7 @@ Status check_organ(const ServerOptions& options, const organ::Organ& recorded) {
 
 Result<SessionStart> go_on(const ServerOptions& options) {
   const auto begin = monotonic_ns();
-  auto session = recording::resume_session(
-      options.resume_file, {.reduction_file = options.reduction_file, .workers = options.workers});
+  auto session = recording::resume_session(options.resume_file, {.workers = options.workers});
   if (!session) return session.error();
   if (const auto same = check_organ(options, session->simulation.organ()); !same)
     return same.error();
@@ -133,7 +95,6 @@ Result<SessionStart> go_on(const ServerOptions& options) {
     return Error{ErrorCode::Usage, "--bleeding: the session of " + options.resume_file +
                                        " does not bleed, leave out --bleeding"};
   start.bleeding = std::move(session->bleeding);
-  if (session->reduction) start.reduction = describe(options.reduction_file, *session->reduction);
   return start;
 }
 
@@ -141,8 +102,7 @@ Result<SessionStart> go_on(const ServerOptions& options) {
 
 Status choose_strain(const ServerOptions& options, organ::Organ& organ) {
   if (options.has_averaged_strain.value_or(false)) return organ::average_strain(organ);
-  if (options.has_averaged_strain || !options.reduction_file.empty())
-    organ::use_plain_strain(organ);
+  if (options.has_averaged_strain) organ::use_plain_strain(organ);
   return {};
 }
 

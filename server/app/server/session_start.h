@@ -20,7 +20,6 @@ namespace trocar::app {
 
 struct SessionStart {
   step::Simulation simulation;
-  std::optional<journal::ReductionDescription> reduction;
   std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
   std::optional<secure::SigningKey> key;       // signs the recording
   // The rest is of a session that goes on.
@@ -30,7 +29,7 @@ struct SessionStart {
   std::vector<ParticipantSlot> unnamed_hands;           // whose tools are there, nobody knows whose
 };
 
-// Strain averaged or plain, as the options say. A reduction is of plain tets.
+// Strain averaged or plain, as the options say.
 Status choose_strain(const ServerOptions& options, organ::Organ& organ);
 
 // Reads the key that --sign names; nothing if it names none.

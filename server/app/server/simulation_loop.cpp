@@ -69,18 +69,6 @@ void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
   for (std::size_t i = 0; i < kMaxTools; ++i) waits[i] += decisions.waiting_blades >> i & 1;
 }
 
-void SolverReport::add(const wire::SolverFigures& figures) {
-  const auto reason = static_cast<std::size_t>(figures.reason);
-  ++(figures.is_reduced ? reduced_ticks : full_ticks);
-  ++ticks_by_reason[reason];
-  if (figures.is_reduced && !last_.is_reduced) ++to_reduced;
-  if (!figures.is_reduced && last_.is_reduced) ++to_full, ++to_full_by_reason[reason];
-  if (figures.is_reduced && last_.is_reduced && !(figures.patches == last_.patches))
-    ++to_another_patch;
-  largest_estimate = std::max(largest_estimate, figures.estimate);
-  last_ = figures;
-}
-
 SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::SimulationInbox& inbox,
                                FrameHandover& handover, JournalSink* journal, LoopOptions options,
                                std::function<void()> ended)
@@ -170,7 +158,6 @@ bool SimulationLoop::run_tick() {
   report_.inputs_dropped += report.inputs_dropped;
   report_.nodes_rejected += report.solve.nodes_rejected;
   report_.faults |= report.faults;
-  if (const auto& solver = report.solve.figures.solver) report_.solver.add(*solver);
   report_.max_active_nodes = std::max(report_.max_active_nodes, report.near.active_nodes);
   if (report.tick % kTicksPerSecond == 0) {
     pace_ = second_.figures();
@@ -179,10 +166,7 @@ bool SimulationLoop::run_tick() {
     time_rate_ = ticks / (ticks + static_cast<float>(slow_ticks_ - slow_ticks_before_));
     slow_ticks_before_ = slow_ticks_;
   }
-  const bool is_due =
-      report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod;
-  if (report.tick % kTicksPerFrame == kSnapshotPhase &&
-      (is_snapshot_requested_.exchange(false, std::memory_order_relaxed) || is_due))
+  if (report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod)
     record_snapshot();
   auto frame = simulation_.pop_frame();
   if (!frame) return false;

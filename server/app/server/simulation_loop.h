@@ -55,20 +55,6 @@ struct RateReport {
   void add(const step::TickDecisions& decisions, bool has_contact, wire::RateLevel level);
 };
 
-// The report says which solver acted, over the whole run of a session with a reduction.
-struct SolverReport {
-  Tick reduced_ticks = 0, full_ticks = 0;
-  std::uint64_t to_reduced = 0, to_full = 0, to_another_patch = 0;  // hand-overs
-  std::array<Tick, wire::kSolverReasons> ticks_by_reason{};
-  std::array<std::uint64_t, wire::kSolverReasons> to_full_by_reason{};
-  float largest_estimate = 0;
-
-  void add(const wire::SolverFigures& figures);
-
- private:
-  wire::SolverFigures last_;
-};
-
 struct LoopReport {
   Tick ticks = 0;  // that it has run
   std::uint64_t slow_ticks = 0;
@@ -76,7 +62,6 @@ struct LoopReport {
   std::uint32_t faults = 0;  // TickFault bits of all ticks
   std::uint32_t max_active_nodes = 0;
   RateReport rate;
-  SolverReport solver;
   step::SharedFrame last_frame;
   StageTimes times;                               // of the whole run
   replication::DurationHistogram bleeding_times;  // thread CPU time of a frame's blood
@@ -101,8 +86,6 @@ class SimulationLoop {
   ~SimulationLoop();
 
   void start();
-  // Asks for a snapshot soon, in a frame; any thread may call it.
-  void request_snapshot() { is_snapshot_requested_.store(true, std::memory_order_relaxed); }
   void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
   // Simulated time over real time, for ticks to come; 0: none comes after the next frame, until the
   // rate is another or the loop is to end. Any thread.
@@ -130,7 +113,7 @@ class SimulationLoop {
   JournalSink* const journal_;
   const LoopOptions options_;
   const std::function<void()> ended_;
-  std::atomic<bool> is_stop_requested_{false}, is_snapshot_requested_{false};
+  std::atomic<bool> is_stop_requested_{false};
   std::atomic<float> rate_{1};
   std::atomic<Frame> followed_{0};
 

@@ -121,33 +121,6 @@ Json rate_figures(const Summary& s) {
           {"least_node_limit", rate.least_node_limit}};
 }
 
-// Says how long each solver acted, and why others took over.
-Json solver_figures(const Summary& s) {
-  if (!s.reduction) return nullptr;
-  const auto& solver = s.loop.solver;
-  const auto by_reason = [](const auto& counts) {
-    Json list = Json::object();
-    for (std::size_t i = 1; i < counts.size(); ++i)  // from 0, a session without a reduction
-      list[wire::name_of(static_cast<wire::SolverReason>(i))] = counts[i];
-    return list;
-  };
-  return {{"reduction", s.reduction->file},
-          {"reduction_hash", hex64(s.reduction->hash)},
-          {"reduced_ticks", solver.reduced_ticks},
-          {"full_ticks", solver.full_ticks},
-          {"to_reduced", solver.to_reduced},
-          {"to_full", solver.to_full},
-          {"to_another_patch", solver.to_another_patch},
-          {"largest_estimate", solver.largest_estimate},
-          {"ticks_by_reason", by_reason(solver.ticks_by_reason)},
-          {"to_full_by_reason", by_reason(solver.to_full_by_reason)},
-          {"ghost",
-           {{"frames", s.ghost.frames},
-            {"begun", s.ghost.begun},
-            {"fallen_behind", s.ghost.fallen},
-            {"largest_mm", 1e3 * static_cast<double>(s.ghost.largest_m)}}}};
-}
-
 // Says what has bled; null in a session that does not.
 Json blood_figures(const Summary& s) {
   const auto& last = *s.loop.last_frame;
@@ -198,7 +171,6 @@ std::string to_json(const Summary& s) {
        {"inputs_dropped", s.loop.inputs_dropped},
        {"nodes_rejected", s.loop.nodes_rejected},
        {"rate", rate_figures(s)},
-       {"solver", solver_figures(s)},
        {"blood", blood_figures(s)},
        {"tick_cpu_us", times(s.loop.times.tick)},
        {"stage_cpu_us", stages(s.loop.times)},

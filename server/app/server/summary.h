@@ -8,7 +8,6 @@
 
 #include "common/wire/recording_state.h"
 #include "server/app/server/simulation_loop.h"
-#include "server/session/ghost/ghost.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/replicator.h"
 
@@ -20,7 +19,6 @@ struct Summary {
   double wall_seconds = 0;
   std::string journal;
   wire::RecordingState recording;
-  std::optional<journal::ReductionDescription> reduction;
   std::uint64_t frames_lost = 0;  // between simulation and I/O thread
   const LoopReport& loop;
   const std::vector<replication::BarrierResult>& barrier;
@@ -30,7 +28,6 @@ struct Summary {
   const net::TcpCounters& tcp;
   const net::DatagramCounters datagrams;
   const participants::SimulationInbox::Counters& inbox;
-  ghost::GhostCounters ghost;
 };
 
 std::string to_json(const Summary& summary);

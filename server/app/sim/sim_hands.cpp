@@ -88,9 +88,9 @@ Status restore_start(journal::SessionJournal& source, const std::string& path,
   return restored ? restored : Error{restored.error().code, path + ": " + restored.error().message};
 }
 
-// Its state is of this organ and these loads, and of no reduction, which hands do not bring along.
+// Its state is of this organ and these loads.
 bool has_recorded_start(const HandsCommand& command, const journal::SessionInfo& info) {
-  return info.starts_from_snapshot && command.organ.empty() && !info.reduction;
+  return info.starts_from_snapshot && command.organ.empty();
 }
 
 // The organ that the hands work on, with the recording's loads, at the start.
@@ -119,13 +119,11 @@ Result<step::Simulation> simulation_of(const HandsCommand& command, journal::Ses
     }
     *organ = std::move(*other);
   }
-  step::Simulation simulation(std::move(*organ), threads, {}, {}, std::move(*loads));
+  step::Simulation simulation(std::move(*organ), threads, {}, std::move(*loads));
   if (has_recorded_start(command, info)) {
     if (auto s = restore_start(source, path, simulation); !s) return s.error();
   } else if (info.starts_from_snapshot) {
-    warn(path,
-         "its equilibrium at the start is of another organ, or of a reduction: this one "
-         "starts at rest");
+    warn(path, "its equilibrium at the start is of another organ: this one starts at rest");
   }
   return simulation;
 }

@@ -27,7 +27,6 @@
 #include "server/lab/scenario/probe_plots.h"
 #include "server/lab/scenario/scenario_run.h"
 #include "server/organs/organ/any_material.h"
-#include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::app {
 namespace {
@@ -226,7 +225,6 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
     return Error{ErrorCode::Usage,
                  "--journal: records ticks, which a static run and the explicit integrator have "
                  "not: leave it out"};
-  const auto& resolved = run.resolved();
   if (run.scenario().run.cutting)
     return Error{
         ErrorCode::Usage,
@@ -235,10 +233,6 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
   recording::Beginning beginning;
   beginning.starts_from_snapshot = run.scenario().run.starts_in_equilibrium;
   beginning.has_implicit_strain = run.has_implicit_strain();
-  if (resolved.reduction)
-    beginning.reduction = {organ::reduction_hash(*resolved.reduction),
-                           std::filesystem::path(*run.scenario().run.reduction).filename().string(),
-                           resolved.reduction->source};
   auto journal = SimJournal::create(options.journal, run.simulation(), std::move(beginning));
   if (journal) (*journal)->record_hands(hands_of(run.scenario()), 0);
   return journal;

@@ -8,7 +8,7 @@
 namespace trocar::calibration {
 
 step::TickDecisions Pilot::decisions(Tick tick) {
-  step::TickDecisions decisions{.is_reduction_off = true};
+  step::TickDecisions decisions;
   if (tick % kPilotTicks == 0) {
     decisions.boundary = world::Boundary::Whole;
     decisions.sweeps = step::kMaxSweeps;
@@ -29,7 +29,7 @@ float Pilot::tolerance_for(double force_n, std::size_t nodes, double looser) con
 }
 
 step::TickDecisions converged_decisions(float tolerance_n) {
-  step::TickDecisions decisions{.boundary = world::Boundary::Whole, .is_reduction_off = true};
+  step::TickDecisions decisions{.boundary = world::Boundary::Whole};
   decisions.policy.residual_tolerance_n = tolerance_n;
   decisions.policy.max_sweeps = kMostConvergedSweeps;
   return decisions;

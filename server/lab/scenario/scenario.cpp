@@ -5,7 +5,6 @@
 
 #include "server/lab/scenario/scenario_resolver.h"
 #include "server/organs/organ/average_strain.h"
-#include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::scenario {
 namespace {
@@ -173,32 +172,6 @@ Status check_blades(const Resolver& resolver, const organ::Organ& organ) {
   return {};
 }
 
-Status resolve_reduction(const Resolver& resolver, ResolvedScenario& result) {
-  const auto& run = resolver.scenario().run;
-  if (!run.reduction) return {};
-  const Place& place = place_of_key(run.given, "reduction", resolver.scenario().run_place);
-  if (run.steps_per_tick > 1)
-    return resolver.wrong(place, "needs one step of time in a tick: remove dt_s");
-  if (!result.displacements.empty() || !result.forces.empty())
-    return resolver.wrong(place,
-                          "is for tools alone: remove [[displace]], [[force]], [[traction]]");
-  for (const auto& probe : resolver.scenario().probes)
-    if (probe.quantity == ProbeQuantity::Reaction)
-      return resolver.wrong(probe.place, "a reaction is not known where a reduction acts");
-  // A reduction is of plain tets: strain is averaged then only if somebody asks for it.
-  const auto asks = [](const MaterialChange& change) {
-    return change.has_averaged_strain.value_or(false);
-  };
-  if (!asks(resolver.scenario().material) &&
-      std::ranges::none_of(resolver.scenario().regions, asks, &RegionRule::material))
-    organ::use_plain_strain(result.organ);
-  const auto path = resolver.scenario().source.parent_path() / *run.reduction;
-  auto reduction = organ::read_session_reduction(path.string(), result.organ);
-  if (!reduction) return resolver.wrong(place, reduction.error().message);
-  result.reduction = std::make_shared<const organ::LocalReduction>(std::move(*reduction));
-  return {};
-}
-
 // Far from the queue nothing moves: whatever acts there has to be in equilibrium already.
 Status check_gravity(const Resolver& resolver, const organ::Organ& organ) {
   const auto& scenario = resolver.scenario();
@@ -262,7 +235,6 @@ Result<ResolvedScenario> resolve(Scenario scenario) {
   if (auto s = resolve_probes(resolver, holds, result); !s) return s.error();
   if (auto s = resolve_anchors(resolver, result); !s) return s.error();
   if (auto s = check_blades(resolver, result.organ); !s) return s.error();
-  if (auto s = resolve_reduction(resolver, result); !s) return s.error();
   result.scenario = std::move(scenario);
   return result;
 }

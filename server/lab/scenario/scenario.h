@@ -20,7 +20,6 @@
 #include "common/base/result.h"
 #include "common/tool/script.h"
 #include "server/organs/material/material_keys.h"
-#include "server/organs/organ/local_reduction.h"
 #include "server/organs/organ/organ.h"
 #include "server/papers/nakao/adaptive_splitter.h"
 #include "server/tissue/step/external_loads.h"
@@ -161,7 +160,6 @@ struct RunRule {
   std::optional<std::uint32_t> far_sweeps;
   std::optional<double> far_over_relaxation;
   bool has_linear_far_field = false;      // as in sessions
-  std::optional<std::string> reduction;   // file, relative to the scenario
   std::optional<nakao::Variant> cutting;  // of a paper; without: as in sessions
   bool self_contact = true;               // tissue does not pass through tissue; dynamic runs
   double tolerance_n = 1e-5;              // of the full solver: residual at which a step is done
@@ -208,10 +206,9 @@ struct ResolvedScenario {
   Scenario scenario;
   organ::Organ organ;  // with the scenario's materials, gravity and fixed nodes
   std::vector<DisplacedNodes> displacements;
-  std::vector<LoadedNodes> forces;                         // and tractions
-  std::vector<NodeList> probe_nodes;                       // per probe; empty for a tool's
-  std::vector<tool::AnchorPoint> anchors;                  // per tool
-  std::shared_ptr<const organ::LocalReduction> reduction;  // null: none
+  std::vector<LoadedNodes> forces;         // and tractions
+  std::vector<NodeList> probe_nodes;       // per probe; empty for a tool's
+  std::vector<tool::AnchorPoint> anchors;  // per tool
 };
 
 // Returns the place of a key in the list, or `other` if the key is not in it.

@@ -8,7 +8,6 @@
 #include "server/lab/scenario/relaxed_organ.h"
 #include "server/tissue/contact/update_claims.h"
 #include "server/tissue/dynamics/relaxation.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::scenario {
 namespace {
@@ -181,8 +180,7 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
     : resolved_(with_response(std::move(resolved))),
       solver_kind_(solver),
       step_count_(steps_of(scenario().run)),
-      simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction),
-                  cutting_of(scenario().run), loads_of(resolved_),
+      simulation_(resolved_.organ, threads, cutting_of(scenario().run), loads_of(resolved_),
                   scheme_of(scenario().run, solver)),
       decisions_(decisions_of(scenario().run, solver, simulation_)) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)

@@ -36,13 +36,12 @@ void read_far_field(tool::TableReader& reader, RunRule& run) {
   const auto is_linear =
       reader.choice<bool, 2>("far_field", {{{"linear", true}, {"exact", false}}});
   run.has_linear_far_field = is_linear.value_or(run.has_linear_far_field);
-  run.reduction = reader.string("reduction");
   std::uint32_t sweeps = 0;
   read_count(reader, "far_sweeps", 1, 16, sweeps);
   if (sweeps > 0) run.far_sweeps = sweeps;
   run.far_over_relaxation = reader.number("far_over_relaxation", 0.5, 1.9);
   if (run.boundary != Boundary::Graded)
-    refuse_keys(reader, {"far_sweeps", "far_over_relaxation", "far_field", "reduction"},
+    refuse_keys(reader, {"far_sweeps", "far_over_relaxation", "far_field"},
                 "is for boundary = \"graded\" or like = \"session\"");
 }
 
@@ -130,8 +129,8 @@ RunRule read_run(tool::TableReader& reader) {
   read_count(reader, "max_sweeps", 1, 1'000'000, run.max_sweeps);
   if (run.mode == RunMode::Static)
     refuse_keys(reader,
-                {"start", "like", "reduction", "far_field", "boundary", "depth", "nodes",
-                 "integrator", "dt_s", "sweeps", "self_contact", "cutting"},
+                {"start", "like", "far_field", "boundary", "depth", "nodes", "integrator", "dt_s",
+                 "sweeps", "self_contact", "cutting"},
                 "is for mode = \"dynamic\"");
   else
     refuse_keys(reader, {"load_steps"}, "is for mode = \"static\"");

@@ -6,7 +6,7 @@ namespace trocar::organ {
 
 // Material::has_averaged_strain in all of the organ's hyperelastic tissue. Error: it has none.
 Status average_strain(Organ& organ);
-// In none of it, as reductions need.
+// In none of it.
 void use_plain_strain(Organ& organ);
 
 }  // namespace trocar::organ

@@ -83,9 +83,9 @@ Status check_creep(const Reduction& r) {
 Status validate(const Reduction& r) {
   const std::size_t modes = r.mode_count();
   if (r.method != "dogan") return bad("is of an unknown method, must be dogan");
-  if (modes == 0 || modes > organ::kMaxReducedModes)
+  if (modes == 0 || modes > kMaxReducedModes)
     return bad("has " + std::to_string(modes) + " modes, must have 1 to " +
-               std::to_string(organ::kMaxReducedModes));
+               std::to_string(kMaxReducedModes));
   if (r.node_count == 0 || r.modes.size() != 3 * std::size_t{r.node_count} * modes)
     return bad("has " + std::to_string(r.modes.size()) + " numbers in its modes, must have 3 x " +
                std::to_string(r.node_count) + " nodes x " + std::to_string(modes) + " modes");
@@ -107,8 +107,7 @@ Status validate(const Reduction& r) {
 }
 
 Status check_organ(const Reduction& r, const organ::Organ& organ) {
-  return organ::check_organ(organ::ReducedOrgan{r.node_count, r.mesh_hash, r.elasticity_hash},
-                            organ);
+  return check_organ(ReducedOrgan{r.node_count, r.mesh_hash, r.elasticity_hash}, organ);
 }
 
 }  // namespace trocar::dogan

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "server/organs/organ/reduced_organ.h"
+#include "server/papers/dogan/reduced_organ.h"
 
 namespace trocar::dogan {
 

@@ -1,14 +1,13 @@
 #include "server/papers/dogan/reduction_file.h"
 
 #include "proto/reduction.pb.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/packed_file.h"
 
 namespace trocar::dogan {
 namespace {
 
 constexpr std::uint32_t kVersion = 1;
-constexpr organ::PackedKind kKind{organ::kDoganReductionMagic,
+constexpr organ::PackedKind kKind{kReductionMagic,
                                   "a .reduction file",
                                   "make one with trocar-organ reduce",
                                   "make it again with trocar-organ reduce",
@@ -94,10 +93,6 @@ Bytes pack_reduction(const Reduction& reduction) {
 }
 
 Result<Reduction> unpack_reduction(BytesView file) {
-  if (organ::has_magic(file, organ::kLocalReductionMagic))
-    return Error{ErrorCode::BadFile,
-                 "is a reduction by --method local, which only sessions use: make one with "
-                 "trocar-organ reduce --method dogan"};
   const auto unpacked = organ::unpack(kKind, file);
   if (!unpacked) return unpacked.error();
   return decode(unpacked->body);

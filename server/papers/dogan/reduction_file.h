@@ -1,8 +1,7 @@
 #pragma once
 
-// `.reduction` files of the method dogan: a packed file (server/organs/organ/packed_file.h) with
-// the magic "TROCARR1" and one proto Reduction message (proto/reduction.proto). Those of the method
-// local are in server/organs/organ/local_reduction_file.h. Nothing in a file is trusted: any bytes
+// `.reduction` files: a packed file (server/organs/organ/packed_file.h) with the magic "TROCARR1"
+// and one proto Reduction message (proto/reduction.proto). Nothing in a file is trusted: any bytes
 // give a reduction that validate() accepts, or an error of one line.
 
 #include <filesystem>
@@ -11,6 +10,8 @@
 #include "server/papers/dogan/reduction.h"
 
 namespace trocar::dogan {
+
+inline constexpr std::string_view kReductionMagic = "TROCARR1";
 
 Status write_reduction(const std::filesystem::path& path, const Reduction& reduction);
 // Refuses one of another organ, too.

@@ -125,8 +125,8 @@ Result<StrainDamage> measure_strain(const std::string& path, double limit,
   if (info.sim_version != kSimVersion)
     return refuse(fmt::format("it was recorded with sim_version {}, this program has {}",
                               info.sim_version, kSimVersion));
-  if (info.reduction || info.begins_with_snapshot() || info.gap_messages > 0)
-    return refuse("it has a reduction or a gap, or does not begin with the organ at rest");
+  if (info.begins_with_snapshot() || info.gap_messages > 0)
+    return refuse("it has a gap, or does not begin with the organ at rest");
   auto organ = recording::recorded_organ(**journal, path);
   if (!organ) return organ.error();
   StrainMap map(*organ, limit);

@@ -56,11 +56,10 @@ void each_text(Message& message, const Visitor& visit) {
 
 // Entries of metadata that say nothing of people. Others hold names of files.
 constexpr std::string_view kHarmlessEntries[] = {
-    "averaged_strain", "continues_tick", "damaged_chunks", "dropped_bytes",  "end",
-    "external_loads",  "from_tick",      "joins",          "organ_hash",     "organ_name",
-    "people",          "protocol",       "reduction_file", "reduction_hash", "reduction_source",
-    "sim_version",     "start",          "start_utc",      "start_utc_ns",   "to_tick",
-    "trimmed_tick",    "words"};
+    "averaged_strain", "continues_tick", "damaged_chunks", "dropped_bytes", "end",
+    "external_loads",  "from_tick",      "joins",          "organ_hash",    "organ_name",
+    "people",          "protocol",       "sim_version",    "start",         "start_utc",
+    "start_utc_ns",    "to_tick",        "trimmed_tick",   "words"};
 
 journal::McapMetadata without_files(journal::McapMetadata metadata) {
   for (auto& [key, value] : metadata.entries)
@@ -125,7 +124,7 @@ class Anonymiser {
     if (!topic && !channel.topic.starts_with(kToolTopics))
       return Error{ErrorCode::BadFile,
                    path_ + ": " + channel.topic +
-                       ": a newer program has written it, and it may hold names: use that one"};
+                       ": another release has written it, and it may hold names: use that one"};
     if (!tells_of_people(channel)) return message.data;
     if (auto decoded = decode(channel, message); !decoded) return decoded.error();
     each_text(*message_,

@@ -42,12 +42,6 @@ Status FrameMessages::write(const step::PublishedFrame& frame, const participant
       replication::describe(event, roster, *claims.add_event());
     if (auto s = sink.write(JournalTopic::Claims, claims); !s) return s;
   }
-  if (!frame.solver_changes.empty()) {
-    proto::SolverLog changes;
-    for (const auto& change : frame.solver_changes)
-      replication::describe(change, *changes.add_change());
-    if (auto s = sink.write(JournalTopic::Solver, changes); !s) return s;
-  }
   proto::FrameState state;
   replication::describe(frame, state);
   for (const auto& tool : state.tool())

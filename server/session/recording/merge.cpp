@@ -89,11 +89,6 @@ Status check_parts(const SessionParts& session, const std::vector<std::string>& 
                                       "protocol {}) than {} (sim_version {}, protocol {})",
                                       info.sim_version, info.protocol, name_of_file(first.path),
                                       begin.sim_version, begin.protocol));
-    const bool has_same_reduction =
-        info.reduction.has_value() == begin.reduction.has_value() &&
-        (!info.reduction || info.reduction->hash == begin.reduction->hash);
-    if (!has_same_reduction)
-      return refused_part(part.path, "had another reduction than " + name_of_file(first.path));
     if (info.has_external_loads)
       return refused_part(part.path, "is of a scenario, of which there are no parts");
   }

@@ -37,7 +37,6 @@ constexpr RecordedText kTexts[] = {
     {"trocar.proto.Participant.name", TextKind::Name},
     {"trocar.proto.Participants.waiting", TextKind::Name},
     {"trocar.proto.MeasuredMaterial.source", TextKind::Harmless},
-    {"trocar.proto.SolverChange.text", TextKind::Harmless},
     {"trocar.proto.SurfaceChange.region", TextKind::Harmless},
     {"trocar.proto.SurfaceTopology.organ_name", TextKind::Harmless},
     {"trocar.proto.TeachEvent.text", TextKind::Teaching},

@@ -14,7 +14,7 @@ class Descriptor;
 namespace trocar::recording {
 
 enum class TextKind : std::uint8_t {
-  Harmless,  // of the organ, the lesson's file, the solver, a device
+  Harmless,  // of the organ, the lesson's file, a device
   Name,      // one person's, and nothing else
   Sentence,  // a program's words, which may hold names
   Teaching,  // TeachEvent.text: likewise, and words that people typed

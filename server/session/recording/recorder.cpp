@@ -23,7 +23,6 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
     bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
              frame.change->removed.size() * sizeof(TriangleIndex) +
              frame.change->added.size() * sizeof(wire::NewTriangle);
-  bytes += frame.solver_changes.size() * sizeof(wire::SolverChange);
   for (const auto& record : frame.records)
     bytes += sizeof record + record.inputs.samples.size() * sizeof(hands::ToolInput);
   return bytes;
@@ -61,7 +60,6 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
                                             {.start_utc_ns = now - begin_tick * kTickNanoseconds,
                                              .organ_name = organ.name,
                                              .organ_hash = hash,
-                                             .reduction = beginning.reduction,
                                              .has_external_loads = !beginning.loads.empty(),
                                              .starts_from_snapshot = beginning.starts_from_snapshot,
                                              .has_implicit_strain = beginning.has_implicit_strain,

@@ -52,8 +52,7 @@ struct RecorderCounters {
 
 // How a recording begins.
 struct Beginning {
-  std::optional<journal::ReductionDescription> reduction;  // of the session; nothing: it has none
-  step::LoadRules loads;                                   // of a scenario
+  step::LoadRules loads;  // of a scenario
   // The state at the start is not that of the organ at rest: the first snapshot says what it is.
   bool starts_from_snapshot = false;
   bool has_implicit_strain = false;                // of a scenario, see journal::SessionInfo

@@ -12,7 +12,6 @@
 #include "server/session/recording/recorded_course.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verify.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::recording {
 namespace {
@@ -94,7 +93,7 @@ Result<std::uint64_t> simulate_up_to(Tick last, journal::SessionJournal& journal
 }
 
 // Whoever verifies the next journal begins with its snapshot, and so does this simulation: what it
-// remembers beside its state, such as the solver that it has told of last, is forgotten.
+// remembers beside its state is forgotten.
 Status begin_as_restored(step::Simulation& simulation) {
   Bytes state;
   simulation.write_snapshot(state);
@@ -143,16 +142,12 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   if (const auto checked = check_info(path, journal.info()); !checked) return checked.error();
   auto organ = recorded_organ(journal, path);
   if (!organ) return organ.error();
-  auto reduction = reduction_of(path, journal.info(), *organ, options.reduction_file);
-  if (!reduction) return reduction.error();
   const auto last = last_whole_tick(journal, path, options.until.value_or(kEnd));
   if (!last) return last.error();
   auto bleeding = recorded_bleeding(journal, path);
   if (!bleeding) return bleeding.error();
-  ResumedSession session{.simulation = step::Simulation(std::move(*organ), options.workers,
-                                                        reduction::at_work(*reduction)),
+  ResumedSession session{.simulation = step::Simulation(std::move(*organ), options.workers),
                          .bleeding = {},
-                         .reduction = *reduction,
                          .continuation = {std::filesystem::path(path).filename().string(), *last}};
   if (*bleeding) session.bleeding.emplace(std::move(**bleeding));
   const auto from = restore_before(*last, journal, path, session);

@@ -12,7 +12,6 @@
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
 #include "common/lesson/course.h"
-#include "server/organs/organ/local_reduction.h"
 #include "server/session/bleeding/bleeding.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/simulation.h"
@@ -20,7 +19,6 @@
 namespace trocar::recording {
 
 struct ResumeOptions {
-  std::string reduction_file;  // of the session; empty: it had none
   unsigned workers = 1;
   // After this tick instead of the last: of a frame, and one that was recorded.
   std::optional<Tick> until;
@@ -28,13 +26,12 @@ struct ResumeOptions {
 
 struct ResumedSession {
   step::Simulation simulation;
-  std::optional<bleeding::Bleeding> bleeding;              // of a session that bleeds
-  std::shared_ptr<const organ::LocalReduction> reduction;  // null: none
-  journal::Continuation continuation;                      // what a new journal has to say
-  Tick snapshot_tick = 0;                                  // simulated again from here on
-  std::uint64_t state_hash = 0;                            // of the last tick, as recorded
-  std::optional<lesson::Course> course;                    // of a lesson that had begun
-  std::string course_lacks;  // a line: why it does not know all that came before
+  std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
+  journal::Continuation continuation;          // what a new journal has to say
+  Tick snapshot_tick = 0;                      // simulated again from here on
+  std::uint64_t state_hash = 0;                // of the last tick, as recorded
+  std::optional<lesson::Course> course;        // of a lesson that had begun
+  std::string course_lacks;                    // a line: why it does not know all that came before
   // Those who were in the session. A hand is among them if the simulation has its tools, and else
   // it never came.
   std::vector<participants::Participant> participants;
@@ -42,7 +39,7 @@ struct ResumedSession {
   std::vector<ParticipantSlot> unnamed_hands;
 };
 
-// Errors: the file is of another sim_version, of another reduction, has a gap or damage, holds no
+// Errors: the file is of another sim_version, has a gap or damage, holds no
 // tick, or its simulation does not give the recorded hashes.
 Result<ResumedSession> resume_session(const std::string& path, const ResumeOptions& options);
 

@@ -39,7 +39,6 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     decisions.set_boundary(static_cast<std::uint32_t>(d.boundary));
     decisions.set_far_sweeps(d.far_sweeps);
     decisions.set_is_far_exact(d.is_far_exact);
-    decisions.set_is_reduction_off(d.is_reduction_off);
     if (d.far_interval != 1) decisions.set_far_interval(d.far_interval);
     if (d.linger_ticks != step::TickDecisions{}.linger_ticks)
       decisions.set_linger_ticks(d.linger_ticks);
@@ -109,7 +108,6 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
                         .far_interval = std::max(1u, d.far_interval()),
                         .linger_ticks = d.linger_ticks() > 0 ? d.linger_ticks()
                                                              : step::TickDecisions{}.linger_ticks,
-                        .is_reduction_off = d.is_reduction_off(),
                         .waiting_blades = d.waiting_blades()};
     if (d.has_policy())
       record.decisions.policy = {.steps_per_tick = d.policy().steps_per_tick(),

@@ -85,7 +85,7 @@ class Trimmer {
     if (auto s = write_lesson(); !s) return s;
     if (session == nullptr) return {};
     if (auto s = write_state(*session); !s) return s;
-    return simulate_first_frame(*session);
+    return {};
   }
 
   Status copy_rest() {
@@ -154,25 +154,6 @@ class Trimmer {
     return write(JournalTopic::Snapshot, cut_.begin, snapshot);
   }
 
-  // A simulation that begins there tells anew which solver is at work.
-  Status simulate_first_frame(ResumedSession& session) {
-    has_first_frame_ = true;
-    auto& simulation = session.simulation;
-    return read_ticks(journal_, [&](const step::TickRecord& record, bool& stop) -> Status {
-      stop = record.tick >= cut_.key;
-      if (record.tick <= simulation.current_tick()) return {};
-      if (simulation.tick(record.inputs, record.decisions).state_hash != record.state_hash)
-        return Error{ErrorCode::BadFile, fmt::format("tick {} does not follow from the state "
-                                                     "before the keyframe",
-                                                     record.tick)};
-      const auto frame = simulation.pop_frame();
-      if (!frame) return {};
-      for (const auto& change : frame->solver_changes)
-        replication::describe(change, *solver_.add_change());
-      return {};
-    });
-  }
-
   Status copy(const journal::McapMessage& message) {
     const auto& topic = reader_.channels().at(message.channel_id).topic;
     const Tick tick = times_.tick(message.log_time);
@@ -181,9 +162,6 @@ class Trimmer {
       if (known == JournalTopic::TickBatch && !has_batch_) return copy_first_batch(message);
       // The keyframe stands for it.
       if (known == JournalTopic::SurfaceDelta && tick <= cut_.key) return {};
-      if (known == JournalTopic::Solver && tick <= cut_.key && has_first_frame_) return {};
-      if (topic.starts_with("/tool/") || known == JournalTopic::FrameState)
-        if (auto s = write_solver(message); !s) return s;
     }
     return copy_.write(topic, tick, message.publish_time, message.data);
   }
@@ -210,13 +188,6 @@ class Trimmer {
     return copy_.write(JournalTopic::TickBatch, tick, message.publish_time, batch);
   }
 
-  Status write_solver(const journal::McapMessage& before) {
-    if (solver_.change().empty()) return {};
-    const auto changes = std::exchange(solver_, {});
-    return copy_.write(JournalTopic::Solver, times_.tick(before.log_time), before.publish_time,
-                       changes);
-  }
-
   // Who joins in the last second may be on a list that comes after it: a list that is said again
   // there tells readers so.
   Status repeat_list() {
@@ -237,8 +208,7 @@ class Trimmer {
   const Cut cut_;
   SessionCopy& copy_;
   journal::JournalTimes times_;
-  proto::SolverLog solver_;
-  bool has_batch_ = false, has_first_frame_ = false;
+  bool has_batch_ = false;
 };
 
 }  // namespace
@@ -263,8 +233,7 @@ Result<TrimReport> trim(const std::string& from_path, const std::string& to_path
     info.continues.reset();
     info.trimmed = journal::Continuation{file, cut->begin};
     if (report.has_state) {
-      auto resumed = resume_session(
-          from_path, {.reduction_file = options.reduction_file, .until = cut->begin});
+      auto resumed = resume_session(from_path, {.until = cut->begin});
       if (!resumed) return resumed.error();
       session.emplace(std::move(*resumed));
     }

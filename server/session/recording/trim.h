@@ -17,8 +17,7 @@ namespace trocar::recording {
 inline constexpr const char* kTrimmedMetadataName = "trocar.trimmed";
 
 struct TrimOptions {
-  Tick from = 0, to = 0;       // from < to
-  std::string reduction_file;  // of the session; empty: it had none
+  Tick from = 0, to = 0;  // from < to
 };
 
 struct TrimReport {

@@ -7,21 +7,14 @@
 #include "common/base/json.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verifier.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::recording {
 namespace {
 
 constexpr Tick kProgressPeriod = 1000;
-
-// "liver.reduction (hash 0123456789abcdef, liver, 16 patches)"
-std::string name_of(const journal::ReductionDescription& reduction) {
-  return reduction.file + " (hash " + hex64(reduction.hash) + ", " + reduction.source + ")";
-}
 
 }  // namespace
 
@@ -50,31 +43,8 @@ const char* name_of(Verdict verdict) {
   return "?";
 }
 
-Result<std::shared_ptr<const organ::LocalReduction>> reduction_of(const std::string& journal,
-                                                                  const journal::SessionInfo& info,
-                                                                  const organ::Organ& organ,
-                                                                  const std::string& file) {
-  using Shared = std::shared_ptr<const organ::LocalReduction>;
-  if (!info.reduction) {
-    if (file.empty()) return Shared();
-    return Error{ErrorCode::Usage,
-                 journal + ": was recorded without a reduction: leave out " + "--reduction"};
-  }
-  if (file.empty())
-    return Error{ErrorCode::Usage, journal + ": was recorded with the reduction " +
-                                       name_of(*info.reduction) + ": give it with --reduction"};
-  auto reduction = organ::read_session_reduction(file, organ);
-  if (!reduction) return reduction.error();
-  if (const auto hash = organ::reduction_hash(*reduction); hash != info.reduction->hash)
-    return Error{ErrorCode::BadFile, file + ": is another reduction (hash " + hex64(hash) +
-                                         ") than that of " + journal + ", " +
-                                         name_of(*info.reduction)};
-  return Shared(std::make_shared<organ::LocalReduction>(std::move(*reduction)));
-}
-
 Result<VerifyReport> verify_journal(const std::string& path,
-                                    const std::function<void(Tick, Tick last)>& progress,
-                                    const std::string& reduction_file) {
+                                    const std::function<void(Tick, Tick last)>& progress) {
   auto journal = journal::SessionJournal::open(path);
   if (!journal) return journal.error();
   const auto& info = (*journal)->info();
@@ -92,12 +62,6 @@ Result<VerifyReport> verify_journal(const std::string& path,
   report.begin_tick = info.begin_tick();
   report.last_tick = info.last_tick;
   report.container = info.summary;
-  std::shared_ptr<const organ::LocalReduction> reduction;
-  if (report.is_resimulated || !reduction_file.empty()) {
-    auto read = reduction_of(path, info, *organ, reduction_file);
-    if (!read) return read.error();
-    reduction = std::move(*read);
-  }
   if (lacks_loads)
     report.reasons.push_back(
         "it is of a scenario with loads besides its tools, which it does not hold: run the "
@@ -125,8 +89,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
 
   std::optional<dynamics::StrainScheme> scheme;
   if (info.has_implicit_strain) scheme = dynamics::StrainScheme::Implicit;
-  auto simulation = step::Simulation(std::move(*organ), 1, reduction::at_work(std::move(reduction)),
-                                     {}, std::move(*loads), scheme);
+  auto simulation = step::Simulation(std::move(*organ), 1, {}, std::move(*loads), scheme);
   Verifier verifier(info, std::move(simulation), std::move(*bleeding), report);
   const auto lists = (*journal)->read_participants(0, std::numeric_limits<Tick>::max(),
                                                    [&](Tick tick, const proto::Participants& list) {

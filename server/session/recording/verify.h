@@ -8,7 +8,7 @@
 //                                it for two frames with equal hashes
 //   /surface/*, /topology*       decoded, by CRC; and as messages
 //   /frame_state, /tool/*        every field that is not a measured time: forces, torques, proxies
-//   /claims, /solver             every event; names are those on /participants
+//   /claims                      every event; names are those on /participants
 //   /bleeding                    the rules by which blood is simulated again; its levels are in
 //                                /surface/*, its figures in /frame_state, its state in snapshots
 //   /hands                       decoded, within their ranges; no simulation knows them
@@ -33,7 +33,6 @@
 #include "common/base/result.h"
 #include "common/base/tick.h"
 #include "common/journal/session_journal.h"
-#include "server/organs/organ/local_reduction.h"
 
 namespace trocar::recording {
 
@@ -59,7 +58,7 @@ struct VerifyReport {
   std::uint64_t ticks_verified = 0;
   std::uint64_t ticks_missing = 0;        // up to last_tick, without a record
   std::uint64_t ticks_not_simulated = 0;  // recorded, but no snapshot led to them
-  std::uint64_t frames_verified = 0;      // with tools, claims and solver changes
+  std::uint64_t frames_verified = 0;      // with tools and claims
   std::uint64_t snapshots_verified = 0, snapshots_continued = 0;
   std::uint64_t surfaces_decoded = 0,
                 surfaces_verified = 0;      // by their CRC; equal to the simulation
@@ -81,17 +80,8 @@ struct VerifyReport {
   std::string why() const;
 };
 
-// The reduction with which a session can be simulated again, from `file`, or null if it had none.
-// Error: it is missing, not that of the session, or there should be none.
-Result<std::shared_ptr<const organ::LocalReduction>> reduction_of(const std::string& journal,
-                                                                  const journal::SessionInfo& info,
-                                                                  const organ::Organ& organ,
-                                                                  const std::string& file);
-
-// `progress` is called now and then with the tick reached. reduction_file: of the session; empty:
-// it had none. Errors: the file cannot be read at all, or the reduction is missing or another.
+// `progress` is called now and then with the tick reached. Error: the file cannot be read at all.
 Result<VerifyReport> verify_journal(const std::string& path,
-                                    const std::function<void(Tick, Tick last)>& progress = {},
-                                    const std::string& reduction_file = {});
+                                    const std::function<void(Tick, Tick last)>& progress = {});
 
 }  // namespace trocar::recording

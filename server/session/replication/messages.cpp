@@ -5,10 +5,9 @@
 #include "common/base/version.h"
 #include "common/wire/figure_messages.h"
 #include "common/wire/haptic_messages.h"
-#include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
-#include "proto/journal.pb.h"
+#include "proto/wire.pb.h"
 
 namespace trocar::replication {
 namespace {
@@ -21,12 +20,6 @@ static_assert(static_cast<int>(wire::ClaimOutcome::RefusedHeld) == proto::CLAIM_
               static_cast<int>(wire::ClaimOutcome::Expired) == proto::CLAIM_EXPIRED &&
               static_cast<int>(wire::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED &&
               wire::kClaimOutcomes == proto::ClaimOutcome_ARRAYSIZE);
-static_assert(static_cast<int>(wire::GhostStatus::None) == proto::GHOST_NONE &&
-              static_cast<int>(wire::GhostStatus::Begins) == proto::GHOST_BEGINS &&
-              static_cast<int>(wire::GhostStatus::Follows) == proto::GHOST_FOLLOWS &&
-              static_cast<int>(wire::GhostStatus::Changed) == proto::GHOST_CHANGED &&
-              static_cast<int>(wire::GhostStatus::Behind) == proto::GHOST_BEHIND &&
-              wire::kGhostStatuses == proto::GhostStatus_ARRAYSIZE);
 static_assert(static_cast<int>(wire::RecordingStatus::Failed) == proto::RECORDING_FAILED);
 
 void write(const Vec3f& from, proto::Vec3& to) {
@@ -126,17 +119,6 @@ wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
   wire::write(change, layout, *envelope.mutable_surface_change());
   envelope.mutable_surface_change()->set_server_time_us(server_time_us);
   return wire::encode_envelope(envelope);
-}
-
-std::string describe(const wire::SolverFigures& solver) {
-  if (solver.is_reduced) return "reduced, " + wire::name_of(solver.patches);
-  return std::string("full, ") + wire::name_of(solver.reason);
-}
-
-void describe(const wire::SolverChange& change, proto::SolverChange& message) {
-  message.set_tick(change.tick);
-  wire::write(change.figures, *message.mutable_solver());
-  message.set_text(describe(change.figures));
 }
 
 void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
@@ -248,30 +230,6 @@ wire::SharedBytes encode_mark_refusal(hands::MarkAction action, Tick tick, const
   message.set_name(name);
   const bool is_return = action == hands::MarkAction::Return;
   message.set_text((is_return ? "not returned to the mark: " : "not marked: ") + why);
-  return wire::encode_envelope(envelope);
-}
-
-wire::SharedBytes encode_ghost(const ghost::GhostReport& report) {
-  proto::Envelope envelope;
-  auto& message = *envelope.mutable_ghost_frame();
-  message.set_status(static_cast<proto::GhostStatus>(report.status));
-  if (report.status == ghost::GhostStatus::Follows) {
-    Bytes payload;
-    wire::encode_keyframe(report.offsets, payload);
-    message.set_frame(report.frame);
-    message.set_epoch(report.epoch);
-    message.set_payload(payload.data(), payload.size());
-    message.set_offsets_crc(wire::surface_crc(report.offsets));
-    message.set_largest_m(report.largest_m);
-    message.set_root_mean_square_m(report.root_mean_square_m);
-    message.set_behind_ms(static_cast<std::uint32_t>(report.behind_ticks));
-  }
-  return wire::encode_envelope(envelope);
-}
-
-wire::SharedBytes encode_no_ghost() {
-  proto::Envelope envelope;
-  envelope.mutable_ghost_frame()->set_status(proto::GHOST_NONE);
   return wire::encode_envelope(envelope);
 }
 

@@ -11,7 +11,6 @@
 #include "common/wire/haptic_patch.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
-#include "server/session/ghost/ghost_follower.h"
 #include "server/session/participants/absences.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/validation.h"
@@ -23,7 +22,6 @@ class ClaimEvent;
 class FrameState;
 class MarkEvent;
 class Participants;
-class SolverChange;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
@@ -33,7 +31,6 @@ void describe(const std::vector<participants::Participant>& present, proto::Part
 void describe(const step::PublishedFrame& frame, proto::FrameState& message);
 void describe(const hands::ClaimEvent& event, const participants::Roster& roster,
               proto::ClaimEvent& message);
-void describe(const wire::SolverChange& change, proto::SolverChange& message);
 
 // `token`: with which the participant may come back; null: not at all.
 wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash, bool has_datagrams,
@@ -55,9 +52,6 @@ void describe(const step::MarkEvent& event, const std::string& name, proto::Mark
 // To who asked; nothing has been done.
 wire::SharedBytes encode_mark_refusal(hands::MarkAction action, Tick tick, const std::string& name,
                                       const std::string& why);
-wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
-// The message says that there is no ghost in this session.
-wire::SharedBytes encode_no_ghost();
 wire::SharedBytes encode_recording(const wire::RecordingState& state);
 wire::SharedBytes encode_haptic_law(const wire::HapticLaw& law);
 // Returns what the tools of one participant feel in a frame; null: no hand feels any of them.
@@ -69,7 +63,5 @@ wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 
 // One line for a person about what became of a claim: by whom it is held and what to do.
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster);
-// Says which solver acts and why: "reduced, patch 12", "full, tissue was cut".
-std::string describe(const wire::SolverFigures& solver);
 
 }  // namespace trocar::replication

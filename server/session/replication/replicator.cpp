@@ -164,7 +164,6 @@ void Replicator::settle_participants() {
     }
     tell_participants(now);
   } while (participants_changed_);
-  settle_ghost();
 }
 
 void Replicator::tell_participants(std::uint64_t now_ns) {
@@ -174,14 +173,6 @@ void Replicator::tell_participants(std::uint64_t now_ns) {
   are_participants_told_ = true;
   participants_told_ns_ = now_ns;
   broadcast(encode_participants(roster_.list(), door_.is_closed(), door_.waiting()));
-}
-
-void Replicator::settle_ghost() {
-  if (!options_.on_ghost_wanted) return;
-  const bool is_wanted =
-      std::ranges::any_of(clients_, [](const auto& entry) { return entry.second->wants_ghost; });
-  if (is_wanted != is_ghost_wanted_) options_.on_ghost_wanted(is_wanted);
-  is_ghost_wanted_ = is_wanted;
 }
 
 void Replicator::end_all(EndReason reason, const std::string& text) {
@@ -245,9 +236,6 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       return handle_lesson(client, envelope.lesson_request());
     case proto::Envelope::kTeachRequest:
       return handle_teach(client, envelope.teach_request());
-    case proto::Envelope::kGhostRequest:
-      handle_ghost_request(client, envelope.ghost_request().is_wanted());
-      return std::nullopt;
     case proto::Envelope::kKeyframeRequest:
       if (client.carrier != 0) return std::nullopt;  // the carrier asks for those that it needs
       client.feed.want_keyframe();
@@ -400,13 +388,6 @@ std::optional<Replicator::Ending> Replicator::show_all(Client& client) {
   return Ending{EndReason::TooSlow, "the outbox is too small for the first messages"};
 }
 
-void Replicator::handle_ghost_request(Client& client, bool is_wanted) {
-  client.wants_ghost = is_wanted && options_.on_ghost_wanted != nullptr;
-  if (!is_wanted) return;
-  // If it does not fit, the next one does; without a ghost the client asks again or waits in vain.
-  send(client, options_.on_ghost_wanted ? encode_ghost({}) : encode_no_ghost());
-}
-
 std::optional<Replicator::Ending> Replicator::handle_ack(Client& client,
                                                          const proto::FrameAck& ack) {
   const Frame frame = ack.frame();
@@ -539,22 +520,6 @@ void Replicator::attend() {
         give_fine_surface(*client);
       }
   settle_participants();
-}
-
-void Replicator::publish(const ghost::GhostReport& report) {
-  // Clients get a report only of the surface that they have: they may wait for a change, or have it
-  // already.
-  const bool follows = report.status == ghost::GhostStatus::Follows;
-  if (follows && (report.epoch != layout_.epoch || report.offsets.size() != layout_.vertex_count()))
-    return;
-  const auto bytes = encode_ghost(report);
-  for (const auto& [id, client] : clients_) {
-    if (!client->wants_ghost) continue;
-    const auto limit = std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
-    const bool has_room = connections_.outstanding_bytes(id) <= limit / 2;
-    const bool is_given = has_room && send(*client, bytes);
-    ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
-  }
 }
 
 void Replicator::set_recording(const wire::RecordingState& state) {

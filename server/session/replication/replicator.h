@@ -32,9 +32,6 @@
 // Guests of a carrier (server/session/guests) are let in as anybody is; what is for everybody goes
 // to the carrier once instead of to each of them.
 //
-// Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
-// full as it may be for frames: these come first.
-//
 // Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects
 // the answers.
 //
@@ -53,7 +50,6 @@
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/access/door.h"
-#include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
 #include "server/session/participants/absences.h"
 #include "server/session/participants/held_tools.h"
@@ -112,8 +108,6 @@ class Replicator final : public net::ConnectionHandler {
   // Frames since the last call, oldest first, none left out. Claim events and surface changes of
   // all of them are delivered, the displacements only of the newest.
   void publish(std::span<const step::SharedFrame> frames);
-
-  void publish(const ghost::GhostReport& report);
 
   // While no frame comes: sees to people, and gives the newest frame to who lacks it.
   void attend();
@@ -187,7 +181,6 @@ class Replicator final : public net::ConnectionHandler {
   wire::SharedBytes pace_message() const;
   // Holds all tools, or lets them go on unless an instructor holds them; tells everybody.
   void set_pace(const std::string& by);
-  void handle_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> handle_tool_change(Client& client, const proto::ToolChange& change);
   std::optional<Ending> handle_point(Client& client, const proto::PointRequest& request);
   std::optional<Ending> handle_stroke(Client& client, const proto::StrokeRequest& request);
@@ -247,7 +240,6 @@ class Replicator final : public net::ConnectionHandler {
   // go only every tenth of a second.
   void settle_participants();
   void tell_participants(std::uint64_t now_ns);
-  void settle_ghost();
 
   net::Connections& connections_;
   participants::SimulationInbox& inbox_;
@@ -263,7 +255,6 @@ class Replicator final : public net::ConnectionHandler {
   bool participants_changed_ = false;                        // since on_participants was called
   bool are_participants_told_ = true;
   std::optional<std::uint64_t> participants_told_ns_;
-  bool is_ghost_wanted_ = false;
   wire::RecordingState recording_{
       .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
   std::uint64_t recording_told_ns_ = 0;

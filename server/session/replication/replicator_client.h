@@ -34,7 +34,6 @@ struct Replicator::Client {
   std::optional<participants::Participant> participant;  // set by Hello
   bool is_welcome = false;
   FrameFeed feed;
-  bool wants_ghost = false;
   pacing::PartPacer fine_parts;  // of the fine surface
   bool has_sent_datagrams = false;
   std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not

@@ -56,8 +56,6 @@ struct ReplicatorOptions {
   bool has_datagrams = false;  // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.
   access::Gate* gate = nullptr;
-  // Whether anybody wants the ghost, after each change; empty: the session has none.
-  std::function<void(bool)> on_ghost_wanted;
 };
 
 struct ReplicatorCounters {
@@ -74,7 +72,6 @@ struct ReplicatorCounters {
   std::uint64_t datagram_rests = 0;  // times that the stream took over from too many datagrams
   std::uint64_t keyframes_given = 0;
   std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
-  std::uint64_t ghosts_given = 0, ghosts_skipped = 0;           // summed over clients
   std::uint64_t bytes_queued = 0;
 };
 

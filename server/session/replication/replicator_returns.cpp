@@ -102,7 +102,6 @@ std::optional<Replicator::Ending> Replicator::come_back(Client& client,
   client.applicant.role = before->applicant.role;
   client.applicant.name = before->applicant.name;
   client.applicant.code = before->applicant.code;
-  client.wants_ghost = before->wants_ghost;
   ++counters_.returned;
   log::info("{} ({}) is back{}", place.name, participants::name_of(place.role),
             hangs ? ", the old connection still hung" : "");

@@ -19,10 +19,9 @@
 // nonlinear problem has no guarantee. Nodes near a tool get more sweeps than the far field, where a
 // few suffice (FarPlan says how many, and with which omega).
 //
-// The far field is moved in one of four ways: not at all, by sweeps over its energies, by sweeps
-// over linear forces (linear_far_field.h), or by a FarFieldSolver. A schedule made before the first
-// sweep (block_descent_schedule.cpp) says what each sweep goes over; execute_schedule() knows no
-// modes.
+// The far field is moved in one of three ways: not at all, by sweeps over its energies, or by
+// sweeps over linear forces (linear_far_field.h). A schedule made before the first sweep
+// (block_descent_schedule.cpp) says what each sweep goes over; execute_schedule() knows no modes.
 
 #include "server/tissue/dynamics/block_descent.h"
 
@@ -489,7 +488,6 @@ void BlockDescent::begin_step(const contact::ContactList& contacts, std::span<co
   }
   inverse_dt_ = 1.0f / settings.dt;
   far_over_relaxation_ = settings.far_sweeps > 0 ? settings.far_over_relaxation : 1;
-  has_far_solver_ = settings.far_solver != nullptr;
   // A node that is held along an axis alone has no linear form.
   is_far_linear_ =
       settings.far_sweeps > 0 && settings.has_linear_far_field && loads.axis_holds.empty();
@@ -505,16 +503,15 @@ void BlockDescent::begin_step(const contact::ContactList& contacts, std::span<co
 }
 
 void BlockDescent::execute_schedule(const contact::ContactList& contacts,
-                                    const SolveSettings& settings, const FarFieldStep& far,
+                                    std::span<const NodeIndex> near, const SolveSettings& settings,
                                     SolveReport& report) {
   // Growth is judged by the nodes that every sweep has.
   const SweepPlan& judged = band_of(settings.sweeps, settings.bands).nodes;
   const auto tolerance = static_cast<double>(settings.residual_tolerance_n);
-  const auto enough = tolerance * tolerance * static_cast<double>(far.near.size());
+  const auto enough = tolerance * tolerance * static_cast<double>(near.size());
   float omega = settings.over_relaxation;
   double last_squares = INFINITY;
   for (const auto& scheduled : schedule_) {
-    if (scheduled.corrects_far) settings.far_solver->correct(far);
     sweep(scheduled, contacts,
           {std::min(omega, scheduled.max_over_relaxation), settings.far_over_relaxation});
     if (!scheduled.is_near) continue;
@@ -565,20 +562,13 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
                                 world::World& world, const ExternalLoads& loads) {
   TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
   TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
-  const bool is_plain =
-      settings.far_sweeps == 0 && settings.bands.empty() && settings.far_solver == nullptr;
+  const bool is_plain = settings.far_sweeps == 0 && settings.bands.empty();
   TROCAR_ASSERT(is_plain || settings.residual_tolerance_n == 0);
-  TROCAR_ASSERT(settings.far_solver == nullptr || settings.far_sweeps == 0);
 
   SolveReport report;
   begin_step(contacts, near, settings, world, loads);
-  const FarFieldStep far{tissue_.groups(), x_.data(), world, contacts, near, settings.dt};
-  if (has_far_solver_) settings.far_solver->begin(far);
-  execute_schedule(contacts, settings, far, report);
+  execute_schedule(contacts, near, settings, report);
   report.largest_move_m = write_back(loads, world);
-  if (has_far_solver_)
-    report.largest_move_m =
-        std::max(report.largest_move_m, settings.far_solver->end(far, v_.data(), world));
   for (const auto g : begun_.groups)
     report.nodes_rejected += static_cast<unsigned>(__builtin_popcount(rejected_[g]));
   if (report.nodes_rejected > 0) {

@@ -23,7 +23,6 @@
 #include "common/base/index.h"
 #include "common/base/workers.h"
 #include "server/tissue/contact/contact_list.h"
-#include "server/tissue/dynamics/far_field_solver.h"
 #include "server/tissue/dynamics/far_plan.h"
 #include "server/tissue/dynamics/lane_packs.h"
 #include "server/tissue/dynamics/linear_far_field.h"
@@ -56,10 +55,6 @@ struct SolveSettings {
   bool has_linear_far_field = false;
   // False: the caller watches the residual over many sweeps. Near an optimum it grows at first.
   bool has_safeguard = true;
-  // Moves all nodes that are not near, with far_sweeps = 0; null: they stand still. It corrects
-  // before each of the last `corrections` sweeps. No tolerance then.
-  FarFieldSolver* far_solver = nullptr;
-  std::uint32_t corrections = 2;
   // At most kMaxSweepBands, ends ascending up to the last near node, sweeps from `sweeps` down to 1
   // and not ascending; empty: all near nodes get `sweeps`. No tolerance then.
   std::span<const SweepBand> bands;
@@ -161,7 +156,6 @@ class BlockDescent {
     std::uint64_t near_nodes = 0;      // of these
     float max_over_relaxation = 1;     // of near nodes
     bool is_near = false;              // counts as a sweep of near nodes, and is judged
-    bool corrects_far = false;         // the far-field solver goes first
   };
   struct PointLinks {
     std::array<Slot, contact::kMaxPointNodes> slots;
@@ -188,8 +182,8 @@ class BlockDescent {
   void schedule_sweeps(const SolveSettings& settings);
   void begin_step(const contact::ContactList& contacts, std::span<const NodeIndex> near,
                   const SolveSettings& settings, world::World& world, const ExternalLoads& loads);
-  void execute_schedule(const contact::ContactList& contacts, const SolveSettings& settings,
-                        const FarFieldStep& far, SolveReport& report);
+  void execute_schedule(const contact::ContactList& contacts, std::span<const NodeIndex> near,
+                        const SolveSettings& settings, SolveReport& report);
   // Returns how far the farthest node has moved, m.
   float write_back(const ExternalLoads& loads, world::World& world);
   float note_residuals(std::span<const NodeIndex> near);
@@ -280,7 +274,6 @@ class BlockDescent {
   std::vector<std::uint8_t> has_energies_;            // per group: see use_energies()
   std::vector<Group> groups_with_energies_;           // of these
   std::span<const NodeIndex> springing_;              // see let_spring()
-  bool has_far_solver_ = false;                       // likewise
   std::uint32_t far_interval_ = 1;                    // of this step
   float inverse_dt_ = 0;                              // of this step
   float far_over_relaxation_ = 1;                     // likewise

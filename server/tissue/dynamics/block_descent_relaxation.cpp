@@ -24,7 +24,7 @@ void BlockDescent::end_relaxation(world::World& world, std::span<const NodeIndex
   auto* const relaxation = tissue_.relaxation();
   if (relaxation == nullptr) return;
   relaxed_.clear();
-  if (far_.node_count == 0 && !has_far_solver_)
+  if (far_.node_count == 0)
     for (const auto g : near_.groups) relaxed_.add(g, near_.lanes[g]);
   for (const auto node : held) relaxed_.add(tissue_.groups(), node);
   relaxed_lanes_.clear();

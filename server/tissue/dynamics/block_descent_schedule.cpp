@@ -85,16 +85,15 @@ void BlockDescent::schedule_sweeps(const SolveSettings& settings) {
     for (std::uint32_t far = 1; ends_far && far < settings.far_sweeps; ++far)
       schedule_.push_back({.plan = &far_swept_});
     const NearBand& near = band_of(left, settings.bands);
-    schedule_.push_back(
-        {.plan = ends_far     ? &last_
-                 : has_packs_ ? &near.kept
-                              : &near.nodes,
-         .packs = has_packs_ ? &near.packed : nullptr,
-         .near_nodes = near.nodes.node_count,
-         .max_over_relaxation =
-             has_few(left) ? kMaxOverRelaxationFewSweeps : std::numeric_limits<float>::infinity(),
-         .is_near = true,
-         .corrects_far = settings.far_solver != nullptr && left <= settings.corrections});
+    schedule_.push_back({.plan = ends_far     ? &last_
+                                 : has_packs_ ? &near.kept
+                                              : &near.nodes,
+                         .packs = has_packs_ ? &near.packed : nullptr,
+                         .near_nodes = near.nodes.node_count,
+                         .max_over_relaxation = has_few(left)
+                                                    ? kMaxOverRelaxationFewSweeps
+                                                    : std::numeric_limits<float>::infinity(),
+                         .is_near = true});
   }
 }
 

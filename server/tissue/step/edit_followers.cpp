@@ -30,8 +30,6 @@ void hand_out_pieces(const world::World& world, SolveWork& solve) {
 
 void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
               SolveWork& solve) {
-  // The far field's nodes are given back first: new ones lie between nodes where these are.
-  if (state.far_model) state.far_model->stop_for(edit, solve.solver, state.world);
   hand_out(edit, state);
   solve.pieces.update(edit, state.world);
   hand_out(edit, state.world, contact, near, solve);

@@ -72,14 +72,13 @@ struct PublishedFrame {
   std::vector<hands::ClaimEvent> claim_events;  // of the ticks since the frame before
   std::vector<MarkEvent> mark_events;           // likewise
   std::vector<TickRecord> records;              // of the ticks since the frame before
-  // Full state after `snapshot_tick`, at the start, every 10 s and on request, else null. Taken
+  // Full state after `snapshot_tick`, at the start and every 10 s, else null. Taken
   // between publications: publishing changes the quantisation's hysteresis after the tick's hash.
   std::shared_ptr<const Bytes> snapshot;
   Tick snapshot_tick = 0;
   // With a snapshot of a session that bleeds: its blood, as of the last frame before.
   std::shared_ptr<const Bytes> bleeding_snapshot;
-  std::vector<wire::SolverChange> solver_changes;  // of the ticks since the frame before
-  wire::FrameFigures figures;                      // of the frame's tick
+  wire::FrameFigures figures;  // of the frame's tick
 };
 
 using SharedFrame = std::shared_ptr<const PublishedFrame>;

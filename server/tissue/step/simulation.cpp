@@ -18,8 +18,7 @@ State::State(const Scene& scene)
       world(scene.organ),
       claims(scene.organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
-      strain_scheme(scene.strain_scheme),
-      far_model(scene.far_models ? scene.far_models->make() : nullptr) {
+      strain_scheme(scene.strain_scheme) {
   dynamics::start_relaxed(scene.organ, world, strain_scheme);
   for (const auto& load : scene.loads.displaced)
     if (load.axes == kAllAxes)
@@ -61,16 +60,14 @@ void State::visit_without_marks(world::StateArchive& archive) {
   claims.visit_state(archive);
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
-  if (far_model) far_model->visit_state(archive);
   archive.fixed_array(quantised);
   self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
 
 namespace {
 
-std::shared_ptr<const Scene> scene_of(organ::Organ organ,
-                                      const dynamics::MakeFarFieldModels& far_models,
-                                      const cutting::Settings& cutting, LoadRules loads,
+std::shared_ptr<const Scene> scene_of(organ::Organ organ, const cutting::Settings& cutting,
+                                      LoadRules loads,
                                       std::optional<dynamics::StrainScheme> strain_scheme) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
@@ -79,7 +76,6 @@ std::shared_ptr<const Scene> scene_of(organ::Organ organ,
   scene->strain_scheme =
       strain_scheme ? *strain_scheme
                     : dynamics::scheme_for(scene->organ, world::World(scene->organ), kTickSeconds);
-  if (far_models) scene->far_models = far_models(scene->organ);
   return scene;
 }
 
@@ -119,7 +115,6 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   contact.requests.reserve(kMaxTools);
   near.seeds.reserve(2 * kMaxTools);
   outbox.claim_events.reserve(4 * kMaxTools);
-  outbox.solver_changes.reserve(4 * kTicksPerFrame);
   topology::Topology topology(s.organ);
   cutting::Places places(topology);
   topology::SurfaceMesh surface(s.organ);
@@ -193,12 +188,9 @@ Status validate(const TickDecisions& d) {
   return validate_policy(d);
 }
 
-Simulation::Simulation(organ::Organ organ, unsigned workers,
-                       const dynamics::MakeFarFieldModels& far_models,
-                       const cutting::Settings& cutting, LoadRules loads,
-                       std::optional<dynamics::StrainScheme> strain_scheme)
-    : Simulation(scene_of(std::move(organ), far_models, cutting, std::move(loads), strain_scheme),
-                 workers) {}
+Simulation::Simulation(organ::Organ organ, unsigned workers, const cutting::Settings& cutting,
+                       LoadRules loads, std::optional<dynamics::StrainScheme> strain_scheme)
+    : Simulation(scene_of(std::move(organ), cutting, std::move(loads), strain_scheme), workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),
@@ -247,7 +239,6 @@ void Simulation::use_mark(hands::MarkAction action, std::uint8_t number) {
 }
 
 std::unique_ptr<StepContext> Simulation::context_of(State& state) const {
-  if (state.far_model && !state.far_model->resume()) return nullptr;
   return std::make_unique<StepContext>(*scene_, workers_, state);
 }
 

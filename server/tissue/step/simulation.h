@@ -17,18 +17,16 @@ Status validate(const TickDecisions& decisions);
 class Simulation {
  public:
   // workers: threads that share the solver's work; results do not depend on it.
-  // far_models: what may move the far field instead of sweeps; empty: nothing.
   // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
   // self-contact, and its states cannot be restored.
   // loads: what acts besides tools, of a scenario that validate() accepts.
   // strain_scheme: of averaged strain; empty: what dynamics::scheme_for() says for ticks of a
   // session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
   explicit Simulation(organ::Organ organ, unsigned workers = 1,
-                      const dynamics::MakeFarFieldModels& far_models = {},
                       const cutting::Settings& cutting = {}, LoadRules loads = {},
                       std::optional<dynamics::StrainScheme> strain_scheme = {});
 
-  // Another one of the same organ, far-field models and loads, at the beginning. Shares with this
+  // Another one of the same organ and loads, at the beginning. Shares with this
   // one what never changes, so that they may be used by two threads.
   Simulation beside(unsigned workers) const;
 

@@ -38,11 +38,11 @@ bool hand_over(const hands::Handover& handover, State& state, Outbox& outbox) {
   return true;
 }
 
-// Tissue sleeps, and pieces move as a whole, where sweeps alone move it, every tick: not in
-// scenarios that load it, and not while a reduction moves it.
-bool may_rest(const TickDecisions& decisions, const ExternalLoads* loads, const State& state) {
+// Tissue sleeps, and pieces move as a whole, where it is swept in every tick: not in scenarios that
+// load it.
+bool may_rest(const TickDecisions& decisions, const ExternalLoads* loads) {
   return decisions.boundary == world::Boundary::Graded && decisions.policy.steps_per_tick == 1 &&
-         loads == nullptr && state.far_model == nullptr;
+         loads == nullptr;
 }
 
 // Tissue that is touched wakes, and its pairs are there in the same tick.
@@ -127,15 +127,12 @@ void sweep_until_rest(dynamics::SolveSettings& settings) {
   settings.bands = {};
 }
 
-// The solver is told this for one step of time. far: it moves what is not swept; null: sweeps do.
-dynamics::SolveSettings settings_of(const TickDecisions& decisions, const SolveWork& work,
-                                    dynamics::FarFieldSolver* far) {
+// The solver is told this for one step of time.
+dynamics::SolveSettings settings_of(const TickDecisions& decisions, const SolveWork& work) {
   const auto& policy = decisions.policy;
   dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
   if (policy.steps_per_tick > 1) settings.dt = static_cast<float>(1e-3 / policy.steps_per_tick);
-  if (far != nullptr) {
-    settings.far_solver = far;
-  } else if (decisions.boundary == world::Boundary::Graded) {
+  if (decisions.boundary == world::Boundary::Graded) {
     const auto plan = work.far_plan.with_steps(policy.steps_per_tick)
                           .with_sweeps(decisions.far_sweeps)
                           .with_interval(decisions.far_interval);
@@ -183,25 +180,13 @@ SolveReport solve_steps(const contact::ContactList& contacts, std::span<const No
   return report;
 }
 
-// Its fields know tools alone, and one step of time in a tick.
-bool is_reduction_off(const TickDecisions& decisions, const ExternalLoads* loads) {
-  return decisions.is_reduction_off || decisions.policy.steps_per_tick > 1 || loads != nullptr;
-}
-
-// far_model: null: sweeps alone move the tissue. Active nodes that have come to rest are let go.
+// Active nodes that have come to rest are let go.
 SolveReport solve(const contact::ContactList& contacts, const propagation::PropagationQueue& queue,
                   const TickDecisions& decisions, bool may_rest, ExternalLoads* loads,
-                  world::World& world, dynamics::FarFieldModel* far_model,
-                  propagation::ActiveSet& active, SolveWork& work) {
-  auto nodes = active.nodes();
-  std::optional<dynamics::FarFieldModel::Choice> modelled;
-  if (far_model != nullptr)
-    modelled =
-        far_model->choose({contacts, nodes, decisions.boundary, is_reduction_off(decisions, loads)},
-                          work.solver, world);
-  if (modelled) nodes = modelled->near;
+                  world::World& world, propagation::ActiveSet& active, SolveWork& work) {
+  const auto nodes = active.nodes();
   const auto layer_nodes = find_bands(nodes, queue, decisions, work.bands);
-  auto settings = settings_of(decisions, work, modelled ? modelled->far : nullptr);
+  auto settings = settings_of(decisions, work);
   const bool has_untouched_wounds = contacts.tools.empty() && !world.origins.empty();
   if (may_rest && has_untouched_wounds && !(settings.residual_tolerance_n > 0))
     sweep_until_rest(settings);
@@ -213,7 +198,6 @@ SolveReport solve(const contact::ContactList& contacts, const propagation::Propa
   report.largest_move_m += settled.empty() ? 0 : propagation::kQuietDisplacementMetres;
   report.layer_nodes = layer_nodes;
   report.figures.layer_sweeps = sweeps_of_layers(decisions);
-  if (far_model != nullptr) report.figures.solver = far_model->figures();
   return report;
 }
 
@@ -222,14 +206,6 @@ void note_motion(float largest_move_m, float carried_m, ContactWork& contact, Cu
   const float any_move_m = std::max(largest_move_m, carried_m);
   contact.finder.surface_moved(any_move_m);
   cut.travel_m += static_cast<double>(any_move_m);
-}
-
-void note_solver(Tick tick, const std::optional<wire::SolverFigures>& before,
-                 const std::optional<wire::SolverFigures>& now, Outbox& outbox) {
-  if (!now) return;
-  if (!before || now->is_reduced != before->is_reduced || now->reason != before->reason ||
-      now->patches != before->patches)
-    outbox.solver_changes.push_back({tick, *now});
 }
 
 // Free pieces that tools hold, each as often as tools hold it.
@@ -279,7 +255,7 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
   work.solver.let_spring(may_rest ? pieces.free() : std::span<const NodeIndex>{});
   if (!is_asleep)
     report = solve(contacts, context.near.queue, decisions, may_rest, loads, state.world,
-                   state.far_model.get(), context.near.active, work);
+                   context.near.active, work);
   pieces::Pieces::Motion motion;
   if (may_rest) {
     motion = pieces.end_step(contacts, state.world);
@@ -367,8 +343,6 @@ std::shared_ptr<PublishedFrame> publish(State& state, const contact::ContactList
   frame->claim_events = outbox.claim_events;
   outbox.claim_events.clear();
   frame->mark_events = std::exchange(outbox.mark_events, {});
-  frame->solver_changes = outbox.solver_changes;
-  outbox.solver_changes.clear();
   frame->figures = {.near = report.near,
                     .solve = report.solve.figures,
                     .relaxation = tissue.relaxation_figures(),
@@ -385,7 +359,6 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   const auto& queue = context.near.queue;
   auto& report = context.report;
   auto& world = state.world;
-  const auto solver_before = report.solve.figures.solver;
   report = {};
   context.frame.reset();
   report.tick = ++world.tick;
@@ -397,7 +370,7 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
     before = now;
   };
 
-  const bool has_rest = may_rest(decisions, loads, state);
+  const bool has_rest = may_rest(decisions, loads);
   const bool is_refused = inputs.handover && !hand_over(*inputs.handover, state, context.outbox);
   report.inputs_dropped =
       admit_inputs(inputs, world.tick, state.tools, state.claims, state.grasps) +
@@ -409,7 +382,6 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   report.near = fill_queue(contacts, loads, decisions, world, context.near);
   end(Stage::Queue);
   report.solve = solve_awake(contacts, has_rest, decisions, loads, state, context);
-  note_solver(world.tick, solver_before, report.solve.figures.solver, context.outbox);
   end(Stage::Solve);
   state.proxies.update(contacts, world, state.tools);
   end(Stage::Contacts);

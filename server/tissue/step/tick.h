@@ -10,7 +10,6 @@
 #include "server/tissue/contact/contact_finder.h"
 #include "server/tissue/contact/self_contact.h"
 #include "server/tissue/dynamics/block_descent.h"
-#include "server/tissue/dynamics/far_field_model.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/tool_table.h"
 #include "server/tissue/pieces/pieces.h"
@@ -33,7 +32,6 @@ struct Scene {
   cutting::Settings cutting;
   LoadRules loads;  // of a scenario
   dynamics::StrainScheme strain_scheme = dynamics::StrainScheme::Implicit;
-  std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
@@ -52,7 +50,6 @@ struct State {
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
   const dynamics::StrainScheme strain_scheme;  // forces of relaxed stress are as it has them
-  std::unique_ptr<dynamics::FarFieldModel> far_model;  // of scenes with models
   Marks marks;
 
   void visit(world::StateArchive& archive);
@@ -105,7 +102,6 @@ struct CutWork {
 struct Outbox {
   std::vector<hands::ClaimEvent> claim_events;
   std::vector<MarkEvent> mark_events;
-  std::vector<wire::SolverChange> solver_changes;
 };
 
 struct StepContext {

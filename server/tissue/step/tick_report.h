@@ -52,8 +52,6 @@ struct TickDecisions {
   // Graded: nodes that have left the queue stay active for so long.
   std::uint32_t linger_ticks = propagation::kQuietTicks;
 
-  bool is_reduction_off = false;  // the full solver, whatever a session's reduction has
-
   // Bits of tools: their blades wait where they are, and the hands feel it (blades/blades.h).
   std::uint32_t waiting_blades = 0;
 

@@ -18,7 +18,6 @@ bool read_page_message(BytesView bytes, proto::Envelope& message) {
     case proto::Envelope::kTeachRequest:
     case proto::Envelope::kViewRequest:
     case proto::Envelope::kLessonRequest:
-    case proto::Envelope::kGhostRequest:
     case proto::Envelope::kBye:
       return true;
     default:

@@ -12,9 +12,9 @@
 // browser can take: frames are skipped there, by their age, for this watcher alone.
 //
 // Bounds: one message each way, 16 MiB down and 64 KiB up; 5 s to say who joins, as many to reach
-// the session. What the browser may say is acknowledgements, pings, requests for keyframes, marks,
-// the full solution and what belongs to a lesson; anything else ends its session. The server checks
-// roles, as of everybody.
+// the session. What the browser may say is acknowledgements, pings, requests for keyframes, marks
+// and what belongs to a lesson; anything else ends its session. The server checks roles, as of
+// everybody.
 
 #include "common/base/asio.h"  // before Boost: see there
 

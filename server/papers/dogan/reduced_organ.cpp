@@ -1,9 +1,9 @@
-#include "server/organs/organ/reduced_organ.h"
+#include "server/papers/dogan/reduced_organ.h"
 
 #include "common/base/checksum.h"
 #include "server/organs/organ/bad_file.h"
 
-namespace trocar::organ {
+namespace trocar::dogan {
 namespace {
 
 template <typename T>
@@ -31,7 +31,7 @@ std::vector<double> elasticity_of(const material::Material& m) {
 
 }  // namespace
 
-std::uint64_t mesh_hash(const Organ& organ) {
+std::uint64_t mesh_hash(const organ::Organ& organ) {
   StateHasher hasher;
   add(hasher, organ.mesh.rest_positions);
   add(hasher, organ.mesh.tets);
@@ -39,7 +39,7 @@ std::uint64_t mesh_hash(const Organ& organ) {
   return hasher.digest();
 }
 
-std::uint64_t elasticity_hash(const Organ& organ) {
+std::uint64_t elasticity_hash(const organ::Organ& organ) {
   StateHasher hasher;
   add(hasher, elasticity_of(organ.material));
   for (const auto& region : organ.regions) {
@@ -52,18 +52,18 @@ std::uint64_t elasticity_hash(const Organ& organ) {
   return hasher.digest();
 }
 
-Status check_organ(const ReducedOrgan& of, const Organ& organ) {
+Status check_organ(const ReducedOrgan& of, const organ::Organ& organ) {
   if (of.node_count != organ.mesh.node_count())
-    return bad("is of another mesh: it has " + std::to_string(of.node_count) + " nodes, " +
-               organ.name + " has " + std::to_string(organ.mesh.node_count()) +
-               ": make it again with trocar-organ reduce");
+    return organ::bad("is of another mesh: it has " + std::to_string(of.node_count) + " nodes, " +
+                      organ.name + " has " + std::to_string(organ.mesh.node_count()) +
+                      ": make it again with trocar-organ reduce");
   if (of.mesh_hash != mesh_hash(organ))
-    return bad("is of another mesh than " + organ.name +
-               ", or one that is held elsewhere: make it again with trocar-organ reduce");
+    return organ::bad("is of another mesh than " + organ.name +
+                      ", or one that is held elsewhere: make it again with trocar-organ reduce");
   if (of.elasticity_hash != elasticity_hash(organ))
-    return bad("is of another material than that of " + organ.name +
-               ": make it again with trocar-organ reduce");
+    return organ::bad("is of another material than that of " + organ.name +
+                      ": make it again with trocar-organ reduce");
   return {};
 }
 
-}  // namespace trocar::organ
+}  // namespace trocar::dogan
