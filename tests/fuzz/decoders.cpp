@@ -40,7 +40,7 @@
 #include "server/organs/organ/organ_file.h"
 #include "server/organs/organ/packed_file.h"
 #include "server/organs/surface/closed_surface.h"
-#include "server/papers/dogan/reduction_file.h"
+#include "server/papers/reduction/reduction_file.h"
 #include "server/session/access/code_book.h"
 #include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/load_messages.h"
@@ -295,7 +295,7 @@ bool decode_organ(BytesView bytes) {
                                              : checked(organ::decode_organ(bytes));
 }
 bool decode_reduction(BytesView bytes) {
-  return decode_packed(bytes, dogan::kReductionMagic, 1, dogan::unpack_reduction);
+  return decode_packed(bytes, reduction::kReductionMagic, 1, reduction::unpack_reduction);
 }
 // The fine surface is valid. The block is large, so that surfaces of all sizes lie near its own.
 void embed_surface(const surface::RawSurface& raw, const std::string& name) {

@@ -18,7 +18,7 @@
 #include "server/broadcast/piece.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/organ_file.h"
-#include "server/papers/dogan/reduction_file.h"
+#include "server/papers/reduction/reduction_file.h"
 #include "server/session/bleeding/blood.h"
 #include "server/tissue/world/surface_layout.h"
 #include "tests/dicom/dicom_sample.h"
@@ -240,11 +240,11 @@ int main(int argc, char** argv) {
   save_blood();
   save_handshakes();
   save_dicom();
-  const auto block = dogan::testing::block(3, 3, 3);
+  const auto block = reduction::testing::block(3, 3, 3);
   save("organ", "block", organ::encode_organ(block));
   save("organ", "block.organ", organ::pack_organ(block));
   save("reduction", "synthetic.reduction",
-       dogan::pack_reduction(dogan::testing::synthetic_reduction(block, 3)));
+       reduction::pack_reduction(reduction::testing::synthetic_reduction(block, 3)));
   const auto path = fs::temp_directory_path() / "trocar-seed.mcap";
   fs::remove(path);
   {

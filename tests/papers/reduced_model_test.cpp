@@ -16,8 +16,7 @@
 namespace trocar::dogan {
 namespace {
 
-using namespace reduce;
-using testing::block;
+using reduction::testing::block;
 
 using finite_elements::Problem;
 
@@ -186,7 +185,7 @@ TEST(Build, CreepGrowsToTheShareThatRemains) {
   const Settings settings{.creep_nodes = 2, .creep_s = 200, .influence_m = 0.011};
   auto small = settings;
   small.force_n = 1e-4, small.radius_m = 0.005;
-  auto reduction = testing::synthetic_reduction(organ, 3);
+  auto reduction = reduction::testing::synthetic_reduction(organ, 3);
   add_creep(*model, small, reduction);
   ASSERT_TRUE(validate(reduction).ok());
   ASSERT_EQ(reduction.creep.size(), 2u);
@@ -230,7 +229,7 @@ TEST(Build, ScaledCreepIsExactWhereItWasStored) {
 
 TEST(CreepFactors, TakeTheNearestCurveAndInterpolateInTime) {
   const auto organ = block(3, 3, 2);
-  const auto reduction = testing::synthetic_reduction(organ, 2);
+  const auto reduction = reduction::testing::synthetic_reduction(organ, 2);
   const CreepFactors factors(reduction, organ);
   EXPECT_EQ(factors.curve_near(NodeIndex(0)).node, NodeIndex(0));
   EXPECT_EQ(factors.curve_near(NodeIndex(8)).node, NodeIndex(7));

@@ -1,6 +1,6 @@
 // Files of reduced models: what is written is read, and each way of being wrong has its line.
 
-#include "server/papers/dogan/reduction_file.h"
+#include "server/papers/reduction/reduction_file.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 #include "tests/support/files.h"
 #include "tests/support/packed_damage.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 namespace {
 
 using testing::block;
@@ -142,4 +142,4 @@ TEST_F(ReductionFile, NumbersThatCannotBeAreRefused) {
 }
 
 }  // namespace
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

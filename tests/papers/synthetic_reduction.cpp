@@ -3,7 +3,7 @@
 #include "common/base/assert.h"
 #include "server/lab/scenario/scenario_block.h"
 
-namespace trocar::dogan::testing {
+namespace trocar::reduction::testing {
 
 organ::Organ block(int nx, int ny, int nz) {
   auto organ = scenario::make_block({nx, ny, nz, 0.01});
@@ -16,8 +16,8 @@ organ::Organ block(int nx, int ny, int nz) {
 Reduction synthetic_reduction(const organ::Organ& organ, std::size_t modes) {
   Reduction r;
   r.source = "synthetic";
-  r.mesh_hash = dogan::mesh_hash(organ);
-  r.elasticity_hash = dogan::elasticity_hash(organ);
+  r.mesh_hash = mesh_hash(organ);
+  r.elasticity_hash = elasticity_hash(organ);
   r.node_count = static_cast<std::uint32_t>(organ.mesh.node_count());
   r.snapshot_count = 5;
   r.force_n = 0.4, r.radius_m = 0.015, r.influence_m = 0.02;
@@ -40,4 +40,4 @@ Reduction synthetic_reduction(const organ::Organ& organ, std::size_t modes) {
   return r;
 }
 
-}  // namespace trocar::dogan::testing
+}  // namespace trocar::reduction::testing

@@ -17,7 +17,6 @@ namespace trocar::validation {
 namespace {
 
 using namespace dogan;
-using namespace reduce;
 
 // The paper reports these errors with eight modes, and these ratios of the displacement at half of
 // the force to that at the whole.
@@ -84,7 +83,7 @@ class ModesStudy {
   Training training_;
   UnseenLoads unseen_;
   double full_s_ = 0;
-  dogan::Reduction eight_;  // the paper's number of modes
+  reduction::Reduction eight_;  // the paper's number of modes
 };
 
 // Errors over the number of modes, for each its own best tangent.

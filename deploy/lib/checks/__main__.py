@@ -67,12 +67,14 @@ class Check:
         self.failures: list[str] = []
         self.skips: list[str] = []
         self.began = time.monotonic()
+        self.steps: list[tuple[str, float]] = []  # each with the time at which it began
         self.changed: list[str] | None = None
         self.runner: Runner | None = None
 
     # --- steps ---
 
     def step(self, text: str) -> None:
+        self.steps.append((text, time.monotonic()))
         print(f"\n== {text}", flush=True)
 
     def command(self, name: str, command: list[str], shown: int = 60) -> bool:
@@ -243,9 +245,16 @@ class Check:
                     name = row.stem.removeprefix("row-")
                     print(f"\n{name}:\n" + "\n".join((folder / f"{name}.txt").read_text().splitlines()[-12:]))
 
+    def times_of_steps(self) -> list[str]:
+        if not self.steps:
+            return []
+        ends = [began for _, began in self.steps[1:]] + [time.monotonic()]
+        return ["The steps took:"] + [f"  {end - began:6.0f} s  {text}"
+                                      for (text, began), end in zip(self.steps, ends)]
+
     def finish(self) -> None:
         """Says what came of it, and ends."""
-        for lines in (self.longest, self.slowest, report.cache_figures()):
+        for lines in (self.longest, self.slowest, report.cache_figures(), self.times_of_steps()):
             if lines:
                 print("\n" + "\n".join(lines))
         self.step(f"Result, after {minutes(time.monotonic() - self.began)}")

@@ -14,7 +14,7 @@
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
 #include "server/papers/dogan/quality.h"
-#include "server/papers/dogan/reduction_file.h"
+#include "server/papers/reduction/reduction_file.h"
 
 namespace trocar::app {
 namespace {
@@ -84,10 +84,10 @@ std::vector<std::size_t> mode_counts(std::size_t all) {
   return counts;
 }
 
-double time_solve_us(const dogan::Reduction& reduced, const organ::Organ& organ,
-                     const reduce::Press& press) {
+double time_solve_us(const reduction::Reduction& reduced, const organ::Organ& organ,
+                     const dogan::Press& press) {
   const dogan::ReducedModel model(reduced, dogan::TangentChoice::Best);
-  const auto forces = reduce::node_forces(organ, press);
+  const auto forces = dogan::node_forces(organ, press);
   constexpr int kTimes = 1000;
   double sum = 0;
   const auto begin = thread_cpu_ns();
@@ -108,7 +108,7 @@ void announce(const ReduceCommand& command) {
 }
 
 Result<Outcome> reduce(const organ::Organ& organ, const ReduceCommand& command) {
-  auto model = reduce::FullModel::create(organ, command.settings.threads);
+  auto model = dogan::FullModel::create(organ, command.settings.threads);
   if (!model) return model.error();
   announce(command);
   const auto progress = make_progress();
@@ -140,14 +140,14 @@ Result<Outcome> reduce(const organ::Organ& organ, const ReduceCommand& command) 
   return outcome;
 }
 
-std::string percent(const reduce::Errors& e) {
+std::string percent(const dogan::Errors& e) {
   char text[80];
   std::snprintf(text, sizeof text, "%5.1f / %5.1f / %5.1f %%", 100 * e.mean, 100 * e.high,
                 100 * e.worst);
   return text;
 }
 
-void print_press(const char* what, const reduce::Press& press) {
+void print_press(const char* what, const dogan::Press& press) {
   const Vec3d& f = press.force_n;
   std::printf("%s node %u under %.3g %.3g %.3g N", what, press.node.value, f.x, f.y, f.z);
 }
@@ -357,7 +357,7 @@ Status run_reduce(ReduceCommand command) {
   if (auto c = check_outputs(folder, out); !c) return c;
   const auto outcome = reduce(*organ, command);
   if (!outcome) return outcome.error();
-  if (auto s = dogan::write_reduction(out, outcome->built.reduction); !s) return s;
+  if (auto s = reduction::write_reduction(out, outcome->built.reduction); !s) return s;
   print(*organ, *outcome);
   std::error_code ignored;
   std::printf("%s, %ju bytes; tables and plots in %s\n", out.c_str(),

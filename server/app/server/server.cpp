@@ -93,6 +93,7 @@ class Server {
   void announce();
   void publish_frames();
   void warn_if_slow();
+  void tell_who_waits();
   Status open_figures();
   Status open_sidecar();
   wire::RecordingState recording_state() const;
@@ -140,6 +141,9 @@ class Server {
   bool is_awaiting_ = false;  // time begins when enough people are there
   bool is_ending_ = false, is_paused_ = false;
   Tick next_warning_ = 0;
+  // Bits of tools of whose blades the log has said that they wait, and when it may say so again.
+  std::uint32_t told_waiting_ = 0;
+  Tick next_told_ = 0;
   double wall_seconds_ = 0;
   std::unique_ptr<SimulationLoop> loop_;  // its thread uses what stands above
 };
@@ -371,6 +375,7 @@ void Server::publish_frames() {
   }
   replicator_->publish(frames_);
   warn_if_slow();
+  tell_who_waits();
 }
 
 void Server::warn_if_slow() {
@@ -385,6 +390,22 @@ void Server::warn_if_slow() {
       tick_ms > kLongTickMs
           ? fmt::format("a tick takes {:.2f} ms (a smaller organ or --workers helps)", tick_ms)
           : std::string("ticks are held up, perhaps by other programs"));
+}
+
+void Server::tell_who_waits() {
+  if (frames_.empty()) return;
+  const auto& frame = *frames_.back();
+  if (frame.tick >= next_told_) {
+    told_waiting_ = 0;
+    next_told_ = frame.tick + kWarningPeriod;
+  }
+  const auto waiting = frame.figures.pace.rate.waiting_blades & ~told_waiting_;
+  told_waiting_ |= waiting;
+  for (const auto& who : replicator_->roster().list())
+    for (int i = 0; i < kToolsPerHand && who.slot.has_tools(); ++i)
+      if ((waiting >> tool_slot(who.slot, i).value & 1) != 0)
+        log::info("{} is kept waiting: tool {} cuts faster than time can stay real", who.name,
+                  i + 1);
 }
 
 Status Server::open_figures() {

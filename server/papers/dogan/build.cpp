@@ -7,12 +7,10 @@
 #include <limits>
 #include <numbers>
 
-#include "server/lab/reduce/check_count.h"
+#include "server/papers/dogan/check_count.h"
 #include "server/papers/dogan/reduced_model.h"
 
 namespace trocar::dogan {
-
-using namespace reduce;
 
 namespace {
 
@@ -105,7 +103,7 @@ CreepCurve curve_of(const organ::Organ& organ, NodeIndex loaded, const std::vect
 
 Status validate(const Settings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
-  if (auto c = check_count("--modes", s.modes, 1, kMaxReducedModes); !c) return c;
+  if (auto c = check_count("--modes", s.modes, 1, reduction::kMaxReducedModes); !c) return c;
   if (auto c = check_count("--places", s.places, 1, 1000); !c) return c;
   if (auto c = check_count("--directions", s.directions, 1, 20); !c) return c;
   if (auto c = check_count("--magnitudes", s.magnitudes, 1, 20); !c) return c;
@@ -191,8 +189,8 @@ Result<Built> reduce(FullModel& model, const Training& training, const Settings&
   }
   auto& r = built.reduction;
   r.source = source_of(model.organ(), training, settings);
-  r.mesh_hash = mesh_hash(model.organ());
-  r.elasticity_hash = elasticity_hash(model.organ());
+  r.mesh_hash = reduction::mesh_hash(model.organ());
+  r.elasticity_hash = reduction::elasticity_hash(model.organ());
   r.node_count = static_cast<std::uint32_t>(model.organ().mesh.node_count());
   r.snapshot_count = static_cast<std::uint32_t>(snapshots.size());
   r.force_n = settings.force_n;

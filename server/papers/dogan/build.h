@@ -13,16 +13,13 @@
 
 #include <functional>
 
-#include "server/lab/reduce/full_model.h"
-#include "server/papers/dogan/reduction.h"
+#include "server/papers/dogan/full_model.h"
+#include "server/papers/reduction/reduction.h"
 
 namespace trocar::dogan {
 
-using reduce::FullModel;
-using reduce::KarhunenLoeve;
-using reduce::Matrix;
-using reduce::Press;
-using reduce::Vector;
+using reduction::CreepCurve;
+using reduction::Reduction;
 
 struct Settings {
   std::size_t modes = 8;        // 1 to 64

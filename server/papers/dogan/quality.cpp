@@ -7,8 +7,6 @@
 
 namespace trocar::dogan {
 
-using namespace reduce;
-
 namespace {
 
 constexpr double kTestSlant = 20 * std::numbers::pi / 180;

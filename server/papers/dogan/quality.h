@@ -6,8 +6,8 @@
 // L2 error of a displacement field u': |u - u'| / |u| over all nodes; of the contact the same of
 // the loaded node alone, which is the paper's 5.28 mm against 4.5 mm.
 
-#include "server/lab/reduce/errors.h"
 #include "server/papers/dogan/build.h"
+#include "server/papers/dogan/errors.h"
 #include "server/papers/dogan/reduced_model.h"
 
 namespace trocar::dogan {
@@ -24,8 +24,6 @@ struct UnseenLoads {
 // Two forces at each of `places` nodes: 0.3 and 0.85 of the largest of the training.
 UnseenLoads solve_unseen(FullModel& model, const Training& training, const Settings& settings,
                          std::size_t places, const Progress& progress = {});
-
-using reduce::Errors;
 
 struct Quality {
   std::size_t modes = 0;

@@ -6,15 +6,15 @@
 
 #include <Eigen/Cholesky>
 
-#include "server/lab/reduce/karhunen_loeve.h"
-#include "server/lab/reduce/presses.h"
-#include "server/papers/dogan/reduction.h"
+#include "server/papers/dogan/karhunen_loeve.h"
+#include "server/papers/dogan/presses.h"
+#include "server/papers/reduction/reduction.h"
 
 namespace trocar::dogan {
 
-using reduce::Matrix;
-using reduce::NodeForce;
-using reduce::Vector;
+using reduction::CreepCurve;
+using reduction::CreepNeighbour;
+using reduction::Reduction;
 
 // The tangent is that of the tissue at rest, or the one of all stored that erred least in the
 // training.

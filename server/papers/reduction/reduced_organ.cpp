@@ -1,9 +1,9 @@
-#include "server/papers/dogan/reduced_organ.h"
+#include "server/papers/reduction/reduced_organ.h"
 
 #include "common/base/checksum.h"
 #include "server/organs/organ/bad_file.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 namespace {
 
 template <typename T>
@@ -66,4 +66,4 @@ Status check_organ(const ReducedOrgan& of, const organ::Organ& organ) {
   return {};
 }
 
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

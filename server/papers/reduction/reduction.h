@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "server/papers/dogan/reduced_organ.h"
+#include "server/papers/reduction/reduced_organ.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 
 inline constexpr std::size_t kMaxCreepTimes = 1000, kMaxCreepCurves = 4096;
 // Largest deviation of the modes' products from 1 and 0.
@@ -60,4 +60,4 @@ Status validate(const Reduction& reduction);
 // Whether it is of this organ.
 Status check_organ(const Reduction& reduction, const organ::Organ& organ);
 
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

@@ -1,8 +1,8 @@
-#include "server/lab/reduce/karhunen_loeve.h"
+#include "server/papers/dogan/karhunen_loeve.h"
 
 #include <Eigen/Eigenvalues>
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 namespace {
 
 // Below, an eigenvalue is made of rounding errors of the products of snapshots.
@@ -37,4 +37,4 @@ Matrix orthogonal_to(const Eigen::Ref<const Matrix>& basis, Matrix fields) {
   return fields;
 }
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

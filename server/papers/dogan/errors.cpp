@@ -1,10 +1,10 @@
-#include "server/lab/reduce/errors.h"
+#include "server/papers/dogan/errors.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 
 Errors errors_of(std::vector<double> values) {
   if (values.empty()) return {};
@@ -14,4 +14,4 @@ Errors errors_of(std::vector<double> values) {
   return {std::accumulate(values.begin(), values.end(), 0.0) / count, values[high], values.back()};
 }
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

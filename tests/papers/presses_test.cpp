@@ -1,23 +1,14 @@
-#include "server/lab/reduce/presses.h"
+#include "server/papers/dogan/presses.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
-#include "server/lab/scenario/scenario_block.h"
+#include "tests/papers/synthetic_reduction.h"
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 namespace {
-
-// A block of cells of 10 mm of the measured liver, whose lowest layer in y is held; centred.
-organ::Organ block(int nx, int ny, int nz) {
-  auto organ = scenario::make_block({nx, ny, nz, 0.01});
-  TROCAR_ASSERT(organ.ok());
-  material::use_measured(*material::find_measured_material("human_liver_nava2008"),
-                         organ->material);
-  return std::move(*organ);
-}
 
 const Vec3d& at(const organ::Organ& organ, NodeIndex node) {
   return organ.mesh.rest_positions[node.value];
@@ -31,7 +22,7 @@ NodeIndex top_centre(const organ::Organ& organ) {
 }
 
 TEST(Presses, TheForceIsEvenlySpreadOverItsPatch) {
-  const auto organ = block(7, 4, 7);
+  const auto organ = reduction::testing::block(7, 4, 7);
   const auto centre = top_centre(organ);
   const Vec3d force{0.1, -0.4, 0.05};
   const auto forces = node_forces(organ, {centre, force, 0.0101});
@@ -51,14 +42,14 @@ TEST(Presses, TheForceIsEvenlySpreadOverItsPatch) {
 }
 
 TEST(Presses, ThinPartsAreNotPressedFromBothSides) {
-  const auto organ = block(7, 4, 7);
+  const auto organ = reduction::testing::block(7, 4, 7);
   const auto centre = top_centre(organ);
   for (const auto& [node, force] : node_forces(organ, {centre, {0, -1, 0}, 0.2}))
     EXPECT_GT(at(organ, node).y, at(organ, organ.fixed_nodes[0]).y);
 }
 
 TEST(Presses, AccessibleNodesAreAwayFromWhatIsHeld) {
-  const auto organ = block(4, 5, 4);
+  const auto organ = reduction::testing::block(4, 5, 4);
   const double low = at(organ, organ.fixed_nodes[0]).y;
   const auto nodes = accessible_nodes(organ, 0.015);
   EXPECT_EQ(nodes.size(), 12u + 12u + 16u);  // two rings and the top of five layers
@@ -68,7 +59,7 @@ TEST(Presses, AccessibleNodesAreAwayFromWhatIsHeld) {
 }
 
 TEST(Presses, PlacesAreSpreadAndKeepAwayFromThoseTaken) {
-  const auto organ = block(9, 3, 9);
+  const auto organ = reduction::testing::block(9, 3, 9);
   const auto candidates = accessible_nodes(organ, 0);
   const auto places = spread_nodes(organ, candidates, 8, 3);
   ASSERT_EQ(places.size(), 8u);
@@ -104,4 +95,4 @@ TEST(Presses, DirectionsGoInAndEveryFifthPulls) {
 }
 
 }  // namespace
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

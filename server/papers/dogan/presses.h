@@ -8,7 +8,7 @@
 
 #include "server/organs/organ/organ.h"
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 
 struct Press {
   NodeIndex node;       // of the surface, the patch's centre
@@ -40,4 +40,4 @@ std::vector<NodeIndex> spread_nodes(const organ::Organ& organ,
 std::vector<Vec3d> press_directions(const Vec3d& outward, std::size_t first, std::size_t count,
                                     double slant_rad);
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -24,4 +24,4 @@ KarhunenLoeve karhunen_loeve(const Matrix& snapshots, std::size_t mode_count);
 // Fields without their parts along the orthonormal columns of a basis (Gram-Schmidt).
 Matrix orthogonal_to(const Eigen::Ref<const Matrix>& basis, Matrix fields);
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

@@ -8,7 +8,7 @@
 #include "common/base/result.h"
 #include "server/organs/organ/organ.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 
 inline constexpr std::size_t kMaxReducedModes = 64;
 
@@ -25,4 +25,4 @@ struct ReducedOrgan {
 // Whether it is this one.
 Status check_organ(const ReducedOrgan& of, const organ::Organ& organ);
 
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

@@ -1,9 +1,9 @@
-#include "server/papers/dogan/reduction_file.h"
+#include "server/papers/reduction/reduction_file.h"
 
 #include "proto/reduction.pb.h"
 #include "server/organs/organ/packed_file.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 namespace {
 
 constexpr std::uint32_t kVersion = 1;
@@ -114,4 +114,4 @@ Result<Reduction> read_reduction(const std::filesystem::path& path, const organ:
   return reduction;
 }
 
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

@@ -1,10 +1,10 @@
-#include "server/lab/reduce/full_model.h"
+#include "server/papers/dogan/full_model.h"
 
 #include <algorithm>
 
 #include "server/organs/organ/any_material.h"
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 namespace {
 
 using finite_elements::Problem;
@@ -178,4 +178,4 @@ std::vector<Vector> FullModel::creep(const Vector& forces, std::span<const doubl
   return found;
 }
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

@@ -7,9 +7,9 @@
 #include <filesystem>
 
 #include "common/base/bytes.h"
-#include "server/papers/dogan/reduction.h"
+#include "server/papers/reduction/reduction.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 
 inline constexpr std::string_view kReductionMagic = "TROCARR1";
 
@@ -21,4 +21,4 @@ Result<Reduction> read_reduction(const std::filesystem::path& path, const organ:
 Bytes pack_reduction(const Reduction& reduction);
 Result<Reduction> unpack_reduction(BytesView file);
 
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 
 struct Errors {
   double mean = 0, high = 0, worst = 0;  // high: 95 of 100 are not above
@@ -12,4 +12,4 @@ struct Errors {
 // All are 0 where there is no value.
 Errors errors_of(std::vector<double> values);
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

@@ -1,11 +1,11 @@
-#include "server/papers/dogan/reduction.h"
+#include "server/papers/reduction/reduction.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "common/math/cholesky.h"
 
-namespace trocar::dogan {
+namespace trocar::reduction {
 namespace {
 
 constexpr double kSymmetry = 1e-9;
@@ -110,4 +110,4 @@ Status check_organ(const Reduction& r, const organ::Organ& organ) {
   return check_organ(ReducedOrgan{r.node_count, r.mesh_hash, r.elasticity_hash}, organ);
 }
 
-}  // namespace trocar::dogan
+}  // namespace trocar::reduction

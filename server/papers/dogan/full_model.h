@@ -12,10 +12,10 @@
 #include <span>
 
 #include "server/lab/finite_elements/solver.h"
-#include "server/lab/reduce/karhunen_loeve.h"
-#include "server/lab/reduce/presses.h"
+#include "server/papers/dogan/karhunen_loeve.h"
+#include "server/papers/dogan/presses.h"
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 
 class FullModel {
  public:
@@ -69,4 +69,4 @@ class FullModel {
   const unsigned threads_;
 };
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

@@ -1,14 +1,14 @@
 // Modes by the method of snapshots against the singular values and vectors of the snapshots
 // themselves, which Eigen computes without forming products.
 
-#include "server/lab/reduce/karhunen_loeve.h"
+#include "server/papers/dogan/karhunen_loeve.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
 #include <random>
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 namespace {
 
 // Singular values fall by `decay` from one to the next.
@@ -72,4 +72,4 @@ TEST(KarhunenLoeve, ThereAreNoMoreModesThanTheSnapshotsSpan) {
 }
 
 }  // namespace
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

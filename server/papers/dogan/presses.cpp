@@ -1,11 +1,11 @@
-#include "server/lab/reduce/presses.h"
+#include "server/papers/dogan/presses.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 namespace {
 
 constexpr std::size_t kPullEvery = 5;
@@ -98,4 +98,4 @@ std::vector<Vec3d> press_directions(const Vec3d& outward, std::size_t first, std
   return directions;
 }
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "server/organs/organ/organ_file.h"
-#include "server/papers/dogan/reduction_file.h"
+#include "server/papers/reduction/reduction_file.h"
 #include "tests/support/program_fixture.h"
 
 namespace trocar {
@@ -33,7 +33,7 @@ TEST_F(ReduceProgram, LeavesAReducedModelAndHowFarItIsOff) {
   EXPECT_NE(text.find("2 loads outside the training"), std::string::npos) << text;
   const auto organ = organ::read_organ(folder_ / "small.organ");
   ASSERT_TRUE(organ.ok());
-  const auto reduction = dogan::read_reduction(folder_ / "small.reduction", *organ);
+  const auto reduction = reduction::read_reduction(folder_ / "small.reduction", *organ);
   ASSERT_TRUE(reduction.ok()) << reduction.error().message;
   EXPECT_EQ(reduction->mode_count(), 4u);
   EXPECT_EQ(reduction->force_n, 0.2);

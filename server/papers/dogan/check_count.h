@@ -5,7 +5,7 @@
 
 #include "common/base/result.h"
 
-namespace trocar::reduce {
+namespace trocar::dogan {
 
 // Usage error that names the option unless low <= value <= high.
 inline Status check_count(const char* option, std::size_t value, std::size_t low,
@@ -16,4 +16,4 @@ inline Status check_count(const char* option, std::size_t value, std::size_t low
                                      std::to_string(high)};
 }
 
-}  // namespace trocar::reduce
+}  // namespace trocar::dogan
