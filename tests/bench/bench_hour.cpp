@@ -1,9 +1,11 @@
-// This program plays a long session without a network: two blades cut all over an organ, stroke
-// after stroke, while a grasper draws the wounds open. Once a minute it prints what a tick, a frame
-// and the recording take by then. In the end it verifies the recording, jumps about in it, and says
-// how much somebody who joins late gets. Decisions are fixed, so that the hash can be repeated.
+// This program plays a long session without a network: two blades cut an organ, stroke after
+// stroke, while a grasper draws the wounds open; now and then the tools rest, and the organ goes
+// back to how it was at first. Once a minute it prints what a tick, a frame and the recording take
+// by then. In the end it verifies the recording, jumps about in it, and says how much somebody who
+// joins late gets. Decisions are fixed, so that the hash can be repeated.
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
@@ -36,9 +38,17 @@ constexpr float kStrokeSpeed_m_s = 0.05f;
 constexpr int kHands = 3, kRetractor = 2;
 constexpr int kSeeks = 20;
 
+constexpr Tick kStep = 4;       // ticks from one place of a hand to its next
+constexpr Tick kRest = 20'000;  // ticks at the end of a minute with a rest
+constexpr float kLeastSpread = 0.05f;
+
 struct Options {
   std::string organ = "liver", journal = "out/bench-hour.mcap";
   int minutes = 60;
+  double stroke_s = 3;     // from one stroke of a blade to its next
+  float spread = 0.7f;     // of the organ's size, where strokes begin
+  int rest_minutes = 0;    // every so many there is a rest; 0: never
+  int return_minutes = 0;  // likewise, the organ goes back
 };
 
 template <typename T>
@@ -60,7 +70,10 @@ double memory_mb() {
 // do.
 class Hands {
  public:
-  explicit Hands(const step::Simulation& simulation) : simulation_(simulation) {
+  Hands(const step::Simulation& simulation, const Options& options)
+      : simulation_(simulation),
+        spread_(options.spread),
+        period_(2 * kStep * static_cast<Tick>(std::lround(125 * options.stroke_s))) {
     for (const auto& p : simulation.organ().mesh.rest_positions) box_.include(to_float(p));
   }
 
@@ -71,19 +84,34 @@ class Hands {
     return join;
   }
 
+  // Until then tools that are lifted stay where they are.
+  void rest_until(Tick tick) { rest_until_ = tick; }
+
   // Blades go by turns of half a stroke; the grasper draws at where the first blade has cut.
   void move(Tick tick, participants::SimulationInbox& inbox) {
-    if (tick % 4 != 0) return;
-    for (int hand = 0; hand < kRetractor; ++hand) {
-      const Tick at = tick + static_cast<Tick>(hand) * kStroke / 2;
-      const auto stroke =
-          static_cast<std::uint32_t>(2 * (at / kStroke)) + static_cast<unsigned>(hand);
-      cut(hand, stroke, at % kStroke, inbox);
+    if (tick % kStep != 0) return;
+    for (int hand = 0; hand < kHands; ++hand) {
+      const Tick turn = hand < kRetractor ? static_cast<Tick>(hand) * period_ / 2 : 0;
+      auto& clock = clocks_[static_cast<std::size_t>(hand)];
+      if (tick == 0) clock = turn;
+      const Tick since = since_begin(clock);
+      if (hand == kRetractor)
+        draw(clock / period_, since, inbox);
+      else
+        cut(hand, static_cast<std::uint32_t>(2 * (clock / period_)) + static_cast<unsigned>(hand),
+            since, inbox);
+      const bool rests = since == kLifted && rest_until_ > 0 && tick < rest_until_ + turn;
+      if (!rests) clock += kStep;
     }
-    draw(tick, inbox);
   }
 
  private:
+  // Ticks since a stroke's beginning, without the time that the tools wait, lifted, for the next
+  // one.
+  Tick since_begin(Tick tick) const {
+    const Tick since = tick % period_, pause = period_ - kStroke;
+    return since < kLifted ? since : since - std::min(pause, since - kLifted);
+  }
   // The blade cuts, is lifted out, is carried over, and goes in by cutting at the next place.
   void cut(int hand, std::uint32_t stroke, Tick since, participants::SimulationInbox& inbox) {
     const auto along = [](std::uint32_t s, Tick ticks) {
@@ -108,23 +136,21 @@ class Hands {
     const float a = std::fmod(static_cast<float>(stroke) * 0.618034f, 1.0f),
                 b = std::fmod(static_cast<float>(stroke) * 0.754877f, 1.0f);
     const Vec3f size = box_.most - box_.least;
-    return box_.least +
-           Vec3f{size.x * (0.15f + 0.7f * a), 0.6f * size.y, size.z * (0.15f + 0.7f * b)};
+    return box_.least + Vec3f{size.x * (0.5f + spread_ * (a - 0.5f)), 0.6f * size.y,
+                              size.z * (0.5f + spread_ * (b - 0.5f))};
   }
   // When the blade is out, the grasper comes down to the nearest surface, lifts it by 15 mm and
   // lets it down again. While the blade cuts, it is carried to above the next place.
-  void draw(Tick tick, participants::SimulationInbox& inbox) {
-    const Tick since = tick % kStroke;
+  void draw(Tick strokes, Tick since, participants::SimulationInbox& inbox) {
+    const auto stroke = static_cast<std::uint32_t>(2 * strokes);
     const Vec3f above{0, kLift_m, 0};
     if (since < kLifted) {
-      const Vec3f next =
-          nearest_above(place_of(static_cast<std::uint32_t>(2 * (tick / kStroke)))) + above;
-      if (since == 0) left_ = tick == 0 ? next : grasped_ + above;
+      const Vec3f next = nearest_above(place_of(stroke)) + above;
+      if (since == 0) left_ = strokes == 0 ? next : grasped_ + above;
       return put(inbox, kRetractor, left_ + (next - left_) * (static_cast<float>(since) / kLifted),
                  tool::Verb::None);
     }
-    if (since < kLifted + 4)
-      grasped_ = nearest_above(place_of(static_cast<std::uint32_t>(2 * (tick / kStroke))));
+    if (since < kLifted + kStep) grasped_ = nearest_above(place_of(stroke));
     const auto part = [since](Tick from, Tick to) {
       return std::clamp(
           (static_cast<float>(since) - static_cast<float>(from)) / static_cast<float>(to - from),
@@ -154,6 +180,10 @@ class Hands {
   }
 
   const step::Simulation& simulation_;
+  const float spread_;
+  const Tick period_;
+  std::array<Tick, kHands> clocks_{};  // of each hand, which stands still while it rests
+  Tick rest_until_ = 0;
   Box<float> box_;
   Vec3f grasped_, left_;
 };
@@ -248,7 +278,7 @@ void play(const Options& options) {
         {join.slot, "hand " + std::to_string(hand + 1), wire::Role::Surgeon, {join.shapes[0]}});
   }
   journal->record_participants(present, 0);
-  Hands hands(simulation);
+  Hands hands(simulation, options);
   Wire wire;
   std::vector<step::SharedFrame> frames;
   const auto decisions = simulation.with_sweeps_for_organ({});
@@ -259,13 +289,18 @@ void play(const Options& options) {
       "| minute | tets | surface vertices | tick | 99th | worst | contacts | solve | memory "
       "(MB) | bytes a frame | recorded (MB) |\n"
       "|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+  const auto is_due = [](int minute, int period) { return period > 0 && minute % period == 0; };
+  inbox.push_mark(hands::MarkAction::Set);
   for (int minute = 1; minute <= options.minutes; ++minute) {
-    app::SimulationLoop loop(
-        simulation, inbox, handover, journal.get(),
-        {.decisions = decisions, .rate = {}, .tick_count = static_cast<Tick>(minute) * kMinute},
-        [] {});
+    const Tick end = static_cast<Tick>(minute) * kMinute;
+    if (minute > 1 && is_due(minute - 1, options.return_minutes))
+      inbox.push_mark(hands::MarkAction::Return);
+    app::SimulationLoop loop(simulation, inbox, handover, journal.get(),
+                             {.decisions = decisions, .rate = {}, .tick_count = end}, [] {});
     do {
-      hands.move(simulation.current_tick(), inbox);
+      const Tick now = simulation.current_tick();
+      if (is_due(minute, options.rest_minutes) && now + kRest == end) hands.rest_until(end);
+      hands.move(now, inbox);
       handover.pop_all(frames);
       wire.take(frames);
     } while (!loop.run_tick());
@@ -292,6 +327,20 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 600))
       ->capture_default_str();
   app.add_option("--journal", options.journal, "recording to make")->capture_default_str();
+  app.add_option("--stroke", options.stroke_s, "s from one stroke of a blade to its next")
+      ->check(CLI::Range(static_cast<double>(kStroke) * 1e-3, 60.0))
+      ->capture_default_str();
+  app.add_option("--spread", options.spread, "of the organ's size: where strokes begin")
+      ->check(CLI::Range(kLeastSpread, 0.7f))
+      ->capture_default_str();
+  app.add_option("--rest", options.rest_minutes,
+                 "every so many minutes tools rest for 20 s; 0: never")
+      ->check(CLI::Range(0, 600))
+      ->capture_default_str();
+  app.add_option("--return", options.return_minutes,
+                 "every so many minutes the organ goes back to how it was at first; 0: never")
+      ->check(CLI::Range(0, 600))
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   play(options);
   const bool is_verified = verify(options);

@@ -12,7 +12,7 @@ constexpr double kTouch_n = 0.002;
 }  // namespace
 
 FeltOrgan::FeltOrgan(const step::Simulation& simulation, const tool::ToolShape& shape)
-    : simulation_(simulation.beside(1)) {
+    : simulation_(simulation.beside()) {
   hands::HandJoin join{.slot = {0}};
   join.shapes[0] = shape;
   inputs_.joins.push_back(join);

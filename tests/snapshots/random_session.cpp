@@ -298,7 +298,7 @@ std::string RandomSession::snapshot() {
   again_.clear();
   simulation_.write_snapshot(bytes_);
   count_state();
-  auto restored = std::make_unique<step::Simulation>(simulation_.beside(1));
+  auto restored = std::make_unique<step::Simulation>(simulation_.beside());
   if (const Status read = restored->restore_snapshot(bytes_); !read.ok())
     return "tick " + std::to_string(tick) + ": " + read.error().message;
   restored->write_snapshot(again_);

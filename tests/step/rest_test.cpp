@@ -294,7 +294,7 @@ TEST(Rest, SnapshotsOfWhatSleepsAreReadAndContinuedBitForBit) {
     next = report.tick + 1 + random.below(90);
     Bytes bytes;
     wound.simulation().write_snapshot(bytes);
-    auto other = std::make_unique<Simulation>(wound.simulation().beside(1));
+    auto other = std::make_unique<Simulation>(wound.simulation().beside());
     ASSERT_TRUE(other->restore_snapshot(bytes).ok());
     ASSERT_EQ(other->state_hash(), wound.simulation().state_hash());
     restored.push_back({std::move(other), report.tick + 20 + random.below(200)});

@@ -1,6 +1,7 @@
 #pragma once
 
-// Damage to packed files (server/organs/organ/packed_file.h) that every reader of one must notice.
+// Damage to .reduction files, which are packed (server/organs/organ/packed_file.h), that their
+// reader must notice.
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,5 @@
 #include "server/app/server/session_start.h"
 
-#include <filesystem>
-
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "server/organs/catalogue/hidden_structures.h"

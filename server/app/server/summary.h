@@ -2,7 +2,6 @@
 
 // Figures of one run as JSON, for scripts and people.
 
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -3,8 +3,8 @@
 // A scenario running: the engine of a session (step::Simulation) without people and network. Each
 // step of a dynamic run is one tick, whose samples are the scenario's tools, whose decisions and
 // policy are [run], and whose external loads are what the scenario moves and loads; so a scenario
-// cuts, tears, publishes frames and takes snapshots as a session does. The state
-// belongs to the run; nothing here reads a clock, so equal scenarios give equal results.
+// cuts, tears, publishes frames and takes snapshots as a session does. The state belongs to the
+// run; nothing here reads a clock, so equal scenarios give equal results.
 //
 // A tick is 1 ms, solved in one or several equal steps of time; with boundary "frozen" only the
 // queue around tools and loads is active. Two drivers act on the same state by other means: a step

@@ -117,21 +117,16 @@ bool FullModel::assemble(const Vector& displacements) {
                                           tangent_);
 }
 
-finite_elements::SparseMatrix FullModel::rest_tangent() {
-  const bool is_admissible = assemble(Vector::Zero(static_cast<Eigen::Index>(dof_count())));
-  TROCAR_ASSERT(is_admissible);
-  return tangent_;
-}
-
 Matrix FullModel::linear_displacements(const Matrix& forces) {
   if (rest_factors_ == nullptr) {
     rest_factors_ = std::make_unique<finite_elements::SparseFactors>();
-    const auto tangent = rest_tangent();
-    rest_factors_->analyze(tangent);
-    const bool is_positive_definite = rest_factors_->factor(tangent);
+    const bool is_admissible = assemble(Vector::Zero(forces.rows()));
+    TROCAR_ASSERT(is_admissible);
+    rest_factors_->analyze(tangent_);
+    const bool is_positive_definite = rest_factors_->factor(tangent_);
     TROCAR_ASSERT(is_positive_definite);
   }
-  const auto& numbers = free_of_dof();
+  const auto& numbers = assembler_->pattern().free_of_dof();
   Matrix free(static_cast<Eigen::Index>(assembler_->pattern().free_count()), forces.cols());
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
     if (numbers[dof] >= 0) free.row(numbers[dof]) = forces.row(static_cast<Eigen::Index>(dof));
@@ -140,12 +135,6 @@ Matrix FullModel::linear_displacements(const Matrix& forces) {
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
     if (numbers[dof] >= 0) all.row(static_cast<Eigen::Index>(dof)) = solution.row(numbers[dof]);
   return all;
-}
-
-std::optional<Vector> FullModel::resistance(const Vector& displacements) {
-  Vector forces = Vector::Zero(displacements.size());
-  if (!assembler_->add_forces(displacements, 0, forces)) return std::nullopt;
-  return forces;
 }
 
 std::optional<Matrix> FullModel::reduced_tangent(const Vector& displacements, const Matrix& modes) {

@@ -29,13 +29,6 @@ class FullModel {
   std::vector<Vector> displacements(const Vector& forces, std::span<const double> shares);
   // Solves K u = f with the first tangent of the tissue at rest, a column each. Factors are kept.
   Matrix linear_displacements(const Matrix& forces);
-  // Returns the forces with which the tissue resists displacements at once; nothing where an
-  // element is not admissible.
-  std::optional<Vector> resistance(const Vector& displacements);
-  // Returns the tangent of the tissue at rest over the degrees of freedom that are not held, N/m;
-  // free_of_dof() gives their numbers, -1 for held ones.
-  finite_elements::SparseMatrix rest_tangent();
-  const std::vector<int>& free_of_dof() const { return assembler_->pattern().free_of_dof(); }
   // B^T K B with the tangent at these displacements, of modes that leave held nodes at rest;
   // nothing where an element is not admissible. N/m.
   std::optional<Matrix> reduced_tangent(const Vector& displacements, const Matrix& modes);
@@ -43,13 +36,6 @@ class FullModel {
   std::vector<Vector> creep(const Vector& forces, std::span<const double> times_s);
 
   const organ::Organ& organ() const { return organ_; }
-  // Without its relaxation; the law that it is near rest.
-  const material::HyperelasticMaterial& material_of(TetIndex tet) const {
-    return elastic_->problem().material_of(tet.value);
-  }
-  const material::HyperelasticMaterial& rest_material_of(TetIndex tet) const {
-    return rest_problem_.material_of(tet.value);
-  }
   std::size_t dof_count() const { return elastic_->problem().dof_count(); }
 
  private:

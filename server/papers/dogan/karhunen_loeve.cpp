@@ -5,6 +5,16 @@
 namespace trocar::dogan {
 namespace {
 
+// Fields without their parts along the orthonormal columns of a basis (Gram-Schmidt).
+Matrix orthogonal_to(const Eigen::Ref<const Matrix>& basis, Matrix fields) {
+  // Once leaves what rounding makes of a large part.
+  for (int pass = 0; pass < 2; ++pass) fields -= basis * (basis.transpose() * fields).eval();
+  return fields;
+}
+
+}  // namespace
+namespace {
+
 // Below, an eigenvalue is made of rounding errors of the products of snapshots.
 constexpr double kLeastEigenvalue = 1e-14;
 
@@ -29,12 +39,6 @@ KarhunenLoeve karhunen_loeve(const Matrix& snapshots, std::size_t mode_count) {
         orthogonal_to(result.modes.leftCols(i), mode.normalized()).col(0).normalized();
   }
   return result;
-}
-
-Matrix orthogonal_to(const Eigen::Ref<const Matrix>& basis, Matrix fields) {
-  // Once leaves what rounding makes of a large part.
-  for (int pass = 0; pass < 2; ++pass) fields -= basis * (basis.transpose() * fields).eval();
-  return fields;
 }
 
 }  // namespace trocar::dogan

@@ -21,7 +21,4 @@ struct KarhunenLoeve {
 // the first counts as none.
 KarhunenLoeve karhunen_loeve(const Matrix& snapshots, std::size_t mode_count);
 
-// Fields without their parts along the orthonormal columns of a basis (Gram-Schmidt).
-Matrix orthogonal_to(const Eigen::Ref<const Matrix>& basis, Matrix fields);
-
 }  // namespace trocar::dogan

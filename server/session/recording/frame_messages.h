@@ -3,9 +3,9 @@
 // One published frame becomes these messages in a journal: the recorder writes these messages, and
 // verification builds them again from a second simulation and compares.
 //
-// The order is: tick batch, surface change, surface delta, topology, keyframe, claims, one
-// state per tool, frame state. A delta refers to the surface before; there is none
-// after skip() and where the surface was replaced, and a keyframe follows there. One thread.
+// The order is: tick batch, surface change, surface delta, topology, keyframe, claims, one state
+// per tool, frame state. A delta refers to the surface before; there is none after skip() and where
+// the surface was replaced, and a keyframe follows there. One thread.
 
 #include <memory>
 #include <span>

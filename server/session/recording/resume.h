@@ -39,8 +39,8 @@ struct ResumedSession {
   std::vector<ParticipantSlot> unnamed_hands;
 };
 
-// Errors: the file is of another sim_version, has a gap or damage, holds no
-// tick, or its simulation does not give the recorded hashes.
+// Errors: the file is of another sim_version, has a gap or damage, holds no tick, or its simulation
+// does not give the recorded hashes.
 Result<ResumedSession> resume_session(const std::string& path, const ResumeOptions& options);
 
 }  // namespace trocar::recording

@@ -369,7 +369,7 @@ void Verifier::compare_snapshot(Tick tick) {
   ++report_.snapshots_verified;
   if (continuations_.size() >= kMostPending)
     return add_reason(fmt::format("tick {}: too many snapshots at once to go on from", tick));
-  Continuation next{simulation_.beside(1), tick, tick + kContinued};
+  Continuation next{simulation_.beside(), tick, tick + kContinued};
   if (const Status restored = next.simulation.restore_snapshot(recorded); !restored.ok())
     return differ({tick, kSnapshots, "state", "cannot be restored: " + restored.error().message,
                    "a state that can"});

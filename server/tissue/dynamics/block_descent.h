@@ -126,9 +126,6 @@ class BlockDescent {
   // energies, damping, loads and tools leave of its mass times acceleration.
   Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node) const;
 
-  // Computes the gradient of the elastic energy between steps, N per node. O(nodes).
-  void elastic_gradient(std::span<Vec3f> gradient);
-
   FarPlan far_plan(float dt);
   const Tissue& tissue() const { return tissue_; }
 

@@ -17,20 +17,6 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
   return gradients.at(slot % kLanes);
 }
 
-void BlockDescent::elastic_gradient(std::span<Vec3f> gradient) {
-  restart_nodal_strain();
-  for_each_group(all_groups_, [&](Group g) {
-    tissue_.begin_group(g, x_.data(), 0);
-    NodeStep8 step{zero_vec8(), zero_sym_mat8()};
-    tissue_.add(g, x_.data(), load_group(&x_[g * kLanes]), step);
-    Vec3Lanes gradients;
-    store(gradients, step.gradient);
-    const auto nodes = tissue_.groups().nodes_of(g);
-    for (std::size_t lane = 0; lane < kLanes; ++lane)
-      if (nodes[lane].is_valid()) gradient[nodes[lane].value] = gradients.at(lane);
-  });
-}
-
 FarPlan BlockDescent::far_plan(float dt) {
   const auto traces = tissue_.traces_at_rest(0, !has_explicit_strain_);
   double stiffness = 0, mass = 0;

@@ -200,8 +200,8 @@ Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
       loads_(std::make_unique<ExternalLoads>(scene_->loads, scene_->organ.fixed_nodes,
                                              scene_->organ.mesh.node_count())) {}
 
-Simulation Simulation::beside(unsigned workers) const {
-  return {scene_, workers};
+Simulation Simulation::beside() const {
+  return {scene_, 1};
 }
 
 TickDecisions Simulation::with_sweeps_for_organ(TickDecisions decisions) const {

@@ -26,9 +26,9 @@ class Simulation {
                       const cutting::Settings& cutting = {}, LoadRules loads = {},
                       std::optional<dynamics::StrainScheme> strain_scheme = {});
 
-  // Another one of the same organ and loads, at the beginning. Shares with this
-  // one what never changes, so that they may be used by two threads.
-  Simulation beside(unsigned workers) const;
+  // Another one of the same organ and loads, at the beginning. Shares with this one what never
+  // changes, so that they may be used by two threads.
+  Simulation beside() const;
 
   // Returns these decisions with the sweeps that this organ needs, if they are Graded. In soft
   // tissue a node feels its own mass more than its neighbours in a tick: three sweeps where it is

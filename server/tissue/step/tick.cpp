@@ -1,7 +1,6 @@
 #include "server/tissue/step/tick.h"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "common/base/timing.h"
