@@ -181,13 +181,17 @@ double Sessions::expected(const Offer& offer) const {
 }
 
 std::vector<Load> Sessions::loads() const {
+  // One that has just begun has no second yet to be judged by.
+  const auto is_overloaded = [](const Session& session) {
+    return session.state == SessionState::Running && session.figures.is_overloaded &&
+           session.figures.tick_p99_s > 0;
+  };
   std::vector<Load> all;
   for (const auto& session : sessions_)
     if (is_alive(*session))
       all.push_back({.name = session->name,
                      .cores = std::max(expected(session->offer), session->peak_cores),
-                     .is_overloaded =
-                         session->state == SessionState::Running && session->figures.is_overloaded,
+                     .is_overloaded = is_overloaded(*session),
                      .tick_p99_s = session->figures.tick_p99_s});
   return all;
 }
