@@ -196,7 +196,11 @@ class Wire {
       const auto before = encoder_.current();
       encoder_.set_current(frame, 0);
       ++frames_;
-      if (before) bytes_ += encoder_.delta_from(*before)->size() + encoder_.state()->size();
+      // A surface that has gone back to an earlier one is sent whole.
+      const bool follows = before && before->surface.size() <= frame->surface.size();
+      if (before)
+        bytes_ += (follows ? encoder_.delta_from(*before) : encoder_.keyframe())->size() +
+                  encoder_.state()->size();
     }
   }
   double bytes_per_frame() {
