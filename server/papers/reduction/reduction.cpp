@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/math/cholesky.h"
+#include "server/organs/organ/bad_file.h"
 
 namespace trocar::reduction {
 namespace {
@@ -12,9 +13,7 @@ constexpr double kSymmetry = 1e-9;
 // Tissue may grow by this factor, which is beyond what any relaxation here can give.
 constexpr double kMaxGrowth = 1e4;
 
-Error bad(const std::string& what) {
-  return {ErrorCode::BadFile, what};
-}
+using organ::bad;
 
 bool are_finite(const std::vector<double>& values) {
   return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
@@ -107,7 +106,17 @@ Status validate(const Reduction& r) {
 }
 
 Status check_organ(const Reduction& r, const organ::Organ& organ) {
-  return check_organ(ReducedOrgan{r.node_count, r.mesh_hash, r.elasticity_hash}, organ);
+  if (r.node_count != organ.mesh.node_count())
+    return bad("is of another mesh: it has " + std::to_string(r.node_count) + " nodes, " +
+               organ.name + " has " + std::to_string(organ.mesh.node_count()) +
+               ": make it again with trocar-organ reduce");
+  if (r.mesh_hash != mesh_hash(organ))
+    return bad("is of another mesh than " + organ.name +
+               ", or one that is held elsewhere: make it again with trocar-organ reduce");
+  if (r.elasticity_hash != elasticity_hash(organ))
+    return bad("is of another material than that of " + organ.name +
+               ": make it again with trocar-organ reduce");
+  return {};
 }
 
 }  // namespace trocar::reduction

@@ -2,7 +2,7 @@
 
 // A reduced model of one organ: a few modes in which it moves, the tangent stiffness among them,
 // and how much farther it is after a while than at once (Dogan 2011, eq. 6 to 14). Made by
-// build.h, kept in a file of its own beside the organ's (reduction_file.h) and good for
+// server/papers/dogan, kept in a file of its own beside the organ's (reduction_file.h) and good for
 // the mesh and elasticity whose hashes it names; density, damping and what blades meet may change.
 
 #include <cstdint>
@@ -10,10 +10,11 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "server/papers/reduction/reduced_organ.h"
+#include "server/papers/reduction/organ_hashes.h"
 
 namespace trocar::reduction {
 
+inline constexpr std::size_t kMaxReducedModes = 64;
 inline constexpr std::size_t kMaxCreepTimes = 1000, kMaxCreepCurves = 4096;
 // Largest deviation of the modes' products from 1 and 0.
 inline constexpr double kOrthonormality = 1e-9;

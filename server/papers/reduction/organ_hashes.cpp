@@ -1,7 +1,6 @@
-#include "server/papers/reduction/reduced_organ.h"
+#include "server/papers/reduction/organ_hashes.h"
 
 #include "common/base/checksum.h"
-#include "server/organs/organ/bad_file.h"
 
 namespace trocar::reduction {
 namespace {
@@ -50,20 +49,6 @@ std::uint64_t elasticity_hash(const organ::Organ& organ) {
   add(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
   add(hasher, organ.stress_free_positions_m);
   return hasher.digest();
-}
-
-Status check_organ(const ReducedOrgan& of, const organ::Organ& organ) {
-  if (of.node_count != organ.mesh.node_count())
-    return organ::bad("is of another mesh: it has " + std::to_string(of.node_count) + " nodes, " +
-                      organ.name + " has " + std::to_string(organ.mesh.node_count()) +
-                      ": make it again with trocar-organ reduce");
-  if (of.mesh_hash != mesh_hash(organ))
-    return organ::bad("is of another mesh than " + organ.name +
-                      ", or one that is held elsewhere: make it again with trocar-organ reduce");
-  if (of.elasticity_hash != elasticity_hash(organ))
-    return organ::bad("is of another material than that of " + organ.name +
-                      ": make it again with trocar-organ reduce");
-  return {};
 }
 
 }  // namespace trocar::reduction
