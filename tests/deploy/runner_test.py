@@ -140,6 +140,20 @@ class Running(unittest.TestCase):
                  self.script("writer", f"sleep 0.3; echo it >{made}")]
         self.assertEqual(self.outcomes(*tests), {"reader:reader": "passed", "writer:writer": "passed"})
 
+    def test_what_starts_programs_is_tried_once_more_by_itself_and_what_computes_is_not(self):
+        def second(name):  # passes from the second time on
+            return f"echo busy; test -e {self.folder}/{name} || {{ touch {self.folder}/{name}; exit 1; }}"
+
+        tests = [self.script("use", second("a"), in_use=True), self.script("sum", second("b")),
+                 self.script("broken", "exit 1", in_use=True),
+                 self.program("p", {"A.One": "ok", "A.Two": "fails"}, code=1, in_use=True)]
+        results, _ = self.run_all(*tests)
+        self.assertEqual({name: result.outcome for name, result in results.items()},
+                         {"use:use": "passed", "sum:sum": "failed", "broken:broken": "failed", "p:A.One": "passed",
+                          "p:A.Two": "failed"})
+        self.assertEqual(results["use:use"].first_output, "busy\n")
+        self.assertFalse(results["p:A.One"].first_output)
+
     def test_a_program_that_cannot_list_its_tests_says_so(self):
         broken = Test(name="b", kind="gtest", command=["false"], targets=[])
         with self.assertRaisesRegex(ValueError, "b: does not list its tests"):

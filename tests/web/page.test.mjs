@@ -139,7 +139,7 @@ test('who loses the connection comes back to the same place', async () => {
   await until('back', () => page.evaluate(() => window.trocar.session.state === 'live'));
   const frames = await page.evaluate(() => window.trocar.replica.frames);
   await until('new frames', () => page.evaluate(n => window.trocar.replica.frames > n + 5, frames));
-  assert.equal(await page.locator('.stage.old').count(), 0);
+  await until('a new picture', async () => await page.locator('.stage.old').count() === 0);
   assert.equal(await page.locator('.people b', { hasText: 'Bea' }).count(), 1);
   await close(page);
 });

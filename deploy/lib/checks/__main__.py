@@ -24,7 +24,8 @@ FUZZ_SECONDS = 3  # for each reader of outside data; deploy/campaign fuzz gives 
 USAGE = """deploy/test [--yes] [--all | --with-node | --with-web | --with-clang] [--changed BASE]
                    [--filter REGEX] [--campaign] [--out DIR]"""
 HELP = """Sets up, builds and tests. The last line says "N passed, N failed"; the exit code is 0 only if nothing
-failed. Reports go to ./out/test: JUnit XML, the logs of what failed, and release-times.tsv with the seconds of each test."""
+failed. A test that starts programs and fails is tried once more, by itself; the end names it.
+Reports go to ./out/test: JUnit XML, the logs of what failed, and release-times.tsv with the seconds of each test."""
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
@@ -66,6 +67,7 @@ class Check:
         self.passed = 0
         self.failures: list[str] = []
         self.skips: list[str] = []
+        self.second_tries: list[str] = []
         self.began = time.monotonic()
         self.steps: list[tuple[str, float]] = []  # each with the time at which it began
         self.changed: list[str] | None = None
@@ -171,6 +173,8 @@ class Check:
                 name = report.full_name(job, result)
                 if result.outcome == "passed":
                     self.passed += 1
+                    if result.first_output:
+                        self.second_tries.append(name)
                 elif result.outcome == "skipped":
                     self.skips.append(f"{name}: {report.reason(result.output)}")
                 else:
@@ -260,11 +264,15 @@ class Check:
         self.step(f"Result, after {minutes(time.monotonic() - self.began)}")
         for name in self.skips:
             print(f"skipped: {name}")
+        for name in self.second_tries:
+            print(f"passed at the second try only, by itself: {name}")
         for name in self.failures:
             print(f"FAILED:  {name}")
         line = f"{self.passed} passed, {len(self.failures)} failed"
         if self.skips:
             line += f", {len(self.skips)} skipped"
+        if self.second_tries:
+            line += f", {len(self.second_tries)} at the second try only"
         print(line, flush=True)
         sys.exit(1 if self.failures else 0)
 

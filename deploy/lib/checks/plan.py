@@ -33,6 +33,7 @@ class Test:
     alone: bool = False  # nothing else runs beside it
     part: str = ""  # "web": only deploy/test --with-web runs it; "campaign": only deploy/campaign
     sanitized: str = ""  # is run a second time with sanitizers: with every "change", or in a "campaign"
+    in_use: bool = False  # starts the programs, which keep the machine's time
 
 
 class Plan:
@@ -43,6 +44,8 @@ class Plan:
         data = json.loads((build / "tests.json").read_text())
         self.targets: dict[str, dict] = data["targets"]
         self.tests = {entry["name"]: Test(**entry) for entry in data["tests"]}
+        for test in self.tests.values():
+            test.in_use = any(name.startswith("trocar-") for name in self.needed_targets(test.targets))
 
     def needed_targets(self, names: list[str]) -> set[str]:
         """These targets and all that they link or start."""

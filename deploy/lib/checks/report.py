@@ -28,6 +28,8 @@ def write_junit(path: Path, jobs: list[Job]) -> None:
             if result.outcome != "passed":
                 kind = "failure" if result.outcome == "failed" else "skipped"
                 xml.SubElement(case, kind).text = _printable(result.output)
+            elif result.first_output:  # as Surefire calls it
+                xml.SubElement(case, "flakyFailure").text = _printable(result.first_output)
     xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
