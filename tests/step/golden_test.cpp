@@ -37,6 +37,7 @@ void expect_golden(const Golden& golden) {
     for (Tick tick = 1; tick <= static_cast<Tick>(golden.ticks); ++tick) {
       hands::TickInputs inputs;
       golden.hands(tick, inputs);
+      simulation.use_workers(1 + static_cast<unsigned>(tick) % workers);  // a team that changes
       const auto& report = simulation.tick(inputs, golden.decisions);
       has_happened |= golden.has_happened(simulation, report);
     }

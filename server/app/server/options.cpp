@@ -321,8 +321,10 @@ void CommandLine::add_session_options() {
       ->capture_default_str();
   app_.add_option("--summary", options_.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
-  app_.add_option("--workers", options_.workers, "threads that share a tick's work")
-      ->check(CLI::Range(1u, kMaxWorkers))
+  app_.add_option("--workers", options_.workers,
+                  "threads that share a tick's work; 0: as many as help, now one and now more")
+      ->type_name("N")
+      ->check(CLI::Range(0u, kMaxWorkers))
       ->capture_default_str()
       ->group("Speed");
   add_log_options(app_, options_.log_level, options_.log_format);

@@ -43,7 +43,7 @@ struct ServerOptions {
   bool are_sweeps_chosen = false;  // else as many as the organ needs
   bool has_fixed_decisions = false;
   double budget_ms = 0.8;  // of a tick's millisecond for its work
-  unsigned workers = 1;
+  unsigned workers = 0;    // threads that share a tick's work; 0: as many as help
   std::string log_level = "info", log_format = "text";
   std::string config_file;     // empty: none
   bool checks_config = false;  // instead of hosting a session

@@ -303,6 +303,7 @@ LoopOptions Server::loop_options() {
   const auto decisions = most_decisions();
   LoopOptions loop{.decisions = decisions, .pace = static_cast<float>(options_.pace)};
   if (start_.bleeding) loop.bleeding = &*start_.bleeding;
+  if (options_.workers == 0) loop.most_workers = simulation_.workers();
   if (options_.seconds > 0)
     loop.tick_count = simulation_.current_tick() + ticks_of(options_.seconds);
   if (options_.has_fixed_decisions) return loop;
@@ -387,7 +388,8 @@ void Server::warn_if_slow() {
   log::warn(
       "simulated time runs at {:.0f} % of real time: {}", 100 * rate.time_rate,
       tick_ms > kLongTickMs
-          ? fmt::format("a tick takes {:.2f} ms (a smaller organ or --workers helps)", tick_ms)
+          ? fmt::format("a tick takes {:.2f} ms (a smaller organ or more free processors help)",
+                        tick_ms)
           : std::string("ticks are held up, perhaps by other programs"));
 }
 

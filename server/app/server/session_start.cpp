@@ -1,5 +1,8 @@
 #include "server/app/server/session_start.h"
 
+#include <algorithm>
+#include <thread>
+
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "server/organs/catalogue/hidden_structures.h"
@@ -11,8 +14,15 @@
 namespace trocar::app {
 namespace {
 
+constexpr unsigned kMostHelpers = 8;  // more gain little in one tick
+
 double seconds_since(std::uint64_t begin_ns) {
   return static_cast<double>(monotonic_ns() - begin_ns) * 1e-9;
+}
+
+unsigned most_workers(const ServerOptions& options) {
+  if (options.workers > 0) return options.workers;
+  return std::clamp(std::thread::hardware_concurrency(), 1u, kMostHelpers);
 }
 
 Result<organ::Organ> read_organ(const ServerOptions& options) {
@@ -35,7 +45,7 @@ std::optional<bleeding::Bleeding> begin_bleeding(const ServerOptions& options) {
 Result<SessionStart> begin_tissue(const ServerOptions& options) {
   auto organ = read_organ(options);
   if (!organ) return organ.error();
-  return SessionStart{.simulation = step::Simulation(std::move(*organ), options.workers)};
+  return SessionStart{.simulation = step::Simulation(std::move(*organ), most_workers(options))};
 }
 
 Result<SessionStart> begin(const ServerOptions& options) {
@@ -57,7 +67,7 @@ Status check_organ(const ServerOptions& options, const organ::Organ& recorded) {
 
 Result<SessionStart> go_on(const ServerOptions& options) {
   const auto begin = monotonic_ns();
-  auto session = recording::resume_session(options.resume_file, {.workers = options.workers});
+  auto session = recording::resume_session(options.resume_file, {.workers = most_workers(options)});
   if (!session) return session.error();
   if (const auto same = check_organ(options, session->simulation.organ()); !same)
     return same.error();

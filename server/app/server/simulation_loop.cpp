@@ -17,6 +17,8 @@ constexpr std::size_t kMostQueuedBytes = 256 * 1024;  // of a recording, faster 
 constexpr std::uint64_t kPauseNapNs = 5'000'000;
 // One frame is on its way to the hands while the next is computed.
 constexpr Frame kFramesAhead = 2;
+// A tick that takes so much of its time leaves too little for what else there is to do.
+constexpr double kShortLoad = 0.8;
 
 void sleep_until(std::uint64_t monotonic) {
   const timespec until{static_cast<time_t>(monotonic / 1'000'000'000),
@@ -82,6 +84,7 @@ SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::Simul
                options_.rate ? options_.rate->nodes : 0) {
   records_.reserve(kTicksPerFrame);
   if (options_.rate) controller_.emplace(*options_.rate);
+  if (options_.most_workers > 0) team_size_.emplace(options_.most_workers);
   record_snapshot();
 }
 
@@ -140,15 +143,22 @@ bool SimulationLoop::run_tick() {
   auto decisions =
       chooser_.choose(controller_ ? controller_->decisions() : options_.decisions, forces_n_);
   decisions.waiting_blades = blade_waits_.waiting();
+  if (team_size_) simulation_.use_workers(team_size_->count());
   const auto begin = options_.clock_ns();
   const auto& report = simulation_.tick(inputs_, decisions);
+  const auto work_ns = options_.clock_ns() - begin;
+  const double load = static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds);
   if (controller_) {
-    const auto work_ns = options_.clock_ns() - begin;
     controller_->observe(report, {work_ns, lateness_ns_});
-    blade_waits_.observe(control::read_cutting_speeds(simulation_),
-                         static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds));
+    blade_waits_.observe(control::read_cutting_speeds(simulation_), load);
   }
   const auto level = controller_ ? controller_->figures().level : wire::RateLevel::Fixed;
+  if (report.contact.nodes > 0)
+    report_.rate.contact_workers += team_size_ ? team_size_->count() : simulation_.workers();
+  if (team_size_) {
+    const bool gives_up = level == wire::RateLevel::Reduced || level == wire::RateLevel::Overloaded;
+    team_size_->observe(load, gives_up || load > kShortLoad);
+  }
   report_.rate.add(decisions, report.contact.nodes > 0, level);
   report_.rate.late_ticks += lateness_ns_ > kTickNanoseconds;
   records_.push_back({report.tick, decisions, inputs_, report.state_hash});

@@ -26,6 +26,7 @@
 #include "server/session/control/blade_waits.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
+#include "server/session/control/team_size.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/replication/duration_histogram.h"
 #include "server/tissue/step/simulation.h"
@@ -51,6 +52,7 @@ struct RateReport {
   std::uint32_t least_node_limit = 0;
   std::uint64_t late_ticks = 0;         // began more than a tick after they were due
   std::array<Tick, kMaxTools> waits{};  // ticks in which a tool's blade waited
+  std::uint64_t contact_workers = 0;    // sum over ticks in contact
 
   void add(const step::TickDecisions& decisions, bool has_contact, wire::RateLevel level);
 };
@@ -71,7 +73,8 @@ struct LoopOptions {
   step::TickDecisions decisions;  // without a rate controller
   float pace = 1;                 // of real time at most, while hands follow
   std::optional<control::RateLimits> rate;
-  Tick tick_count = 0;  // end at the first frame at or after this; 0: when told to
+  unsigned most_workers = 0;  // so many share a tick's work at most; 0: all that there are, always
+  Tick tick_count = 0;        // end at the first frame at or after this; 0: when told to
   bleeding::Bleeding* bleeding = nullptr;  // of a session that bleeds; outlives the loop
   std::function<std::uint64_t()> clock_ns = monotonic_ns;  // of what ticks take; tests have others
 };
@@ -119,8 +122,9 @@ class SimulationLoop {
 
   // Simulation thread.
   std::optional<control::RateController> controller_;
-  control::DepthChooser chooser_;        // of a calibrated organ, unless decisions are fixed
-  control::BladeWaits blade_waits_;      // unless decisions are fixed
+  control::DepthChooser chooser_;    // of a calibrated organ, unless decisions are fixed
+  control::BladeWaits blade_waits_;  // unless decisions are fixed
+  std::optional<control::TeamSize> team_size_;
   std::vector<double> forces_n_;         // of the tools that touched in the last tick
   std::uint64_t lateness_ns_ = 0;        // of the tick about to run
   std::uint64_t slow_ticks_before_ = 0;  // until the last full second

@@ -109,16 +109,19 @@ Json rate_figures(const Summary& s) {
   Json waits = Json::object();
   for (std::size_t i = 0; i < kMaxTools; ++i)
     if (rate.waits[i] > 0) waits["tool-" + std::to_string(i)] = rate.waits[i];
-  return {{"ticks", ticks},
-          {"late_ticks", rate.late_ticks},
-          {"blade_wait_ticks", waits},
-          {"lowered", last.lowered},
-          {"raised", last.raised},
-          {"budget_us", last.budget_us},
-          {"contact_ticks", rate.contact_ticks},
-          {"mean_sweeps_in_contact", mean_sweeps},
-          {"least_sweeps", rate.least_sweeps},
-          {"least_node_limit", rate.least_node_limit}};
+  return {
+      {"ticks", ticks},
+      {"late_ticks", rate.late_ticks},
+      {"blade_wait_ticks", waits},
+      {"lowered", last.lowered},
+      {"raised", last.raised},
+      {"budget_us", last.budget_us},
+      {"contact_ticks", rate.contact_ticks},
+      {"mean_workers_in_contact", static_cast<double>(rate.contact_workers) /
+                                      static_cast<double>(std::max<Tick>(1, rate.contact_ticks))},
+      {"mean_sweeps_in_contact", mean_sweeps},
+      {"least_sweeps", rate.least_sweeps},
+      {"least_node_limit", rate.least_node_limit}};
 }
 
 // Says what has bled; null in a session that does not.

@@ -147,9 +147,8 @@ bool Assembler::run(const Job& job, Vector& forces, Vector* product, SparseMatri
   const std::size_t count = problem_.mesh.element_count();
   for (std::size_t begin = 0; begin < count; begin += kBlockElements) {
     const std::size_t size = std::min(kBlockElements, count - begin);
-    workers_.run([&](unsigned worker) {
-      for (std::size_t i = worker; i < size; i += workers_.count())
-        block_.is_admissible[i] = compute_any(job, begin + i, i) ? 1 : 0;
+    workers_.for_each(size, 1, [&](std::size_t i, unsigned) {
+      block_.is_admissible[i] = compute_any(job, begin + i, i) ? 1 : 0;
     });
     for (std::size_t i = 0; i < size; ++i) {
       if (block_.is_admissible[i] == 0) return false;

@@ -44,6 +44,8 @@ constexpr std::size_t kUsualSweeps = 64;
 constexpr int kRestoredLayers = 3;
 // Drag is so many times the inertia that would do for domains that are folded or drawn out.
 constexpr float kDrag = 2;
+// What one worker sweeps in a row: some microseconds.
+constexpr std::size_t kSweptInARow = 4, kPacksInARow = 2;
 
 // Returns the mean velocity of who shares a smoothing domain with each node; velocities: per slot.
 Vec8 velocity_around(const NodalStrain& strain, Group group, const Float4* velocities) {
@@ -132,7 +134,7 @@ void BlockDescent::read_motion(const world::World& world) {
 void BlockDescent::use_linear_far_field(const world::World& world) {
   linear_far_field_ = std::make_unique<LinearFarField>(tissue_, world);
   linear_far_field_->read_state(x_.data(), world);
-  scratch_.resize(workers_.count());
+  scratch_.resize(workers_.most());
   due_.reserve(all_groups_.size());
 }
 
@@ -248,10 +250,8 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads,
     due_.clear();
     for (const auto g : all_groups_)
       if (linear_far_field_->is_due(g)) due_.push_back(g);
-    workers_.run([&](unsigned w) {
-      const auto n = due_.size(), count = std::size_t{workers_.count()};
-      for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
-        linear_far_field_->renew(due_[i], scratch_[w]);
+    workers_.for_each(due_.size(), 1, [&](std::size_t i, unsigned w) {
+      linear_far_field_->renew(due_[i], scratch_[w]);
     });
   } else {
     for_each_group(far_swept_.groups, [&](Group g) { ask_energies(g, x_.data()); });
@@ -377,33 +377,22 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
 void BlockDescent::sweep(const ScheduledSweep& scheduled, const contact::ContactList& contacts,
                          Relaxation omega) {
   const SweepPlan& plan = *scheduled.plan;
-  workers_.run([&](unsigned w) {
-    const auto count = std::size_t{workers_.count()};
-    for (std::size_t colour = 0; colour < tissue_.groups().colour_count(); ++colour) {
-      if (scheduled.packs != nullptr) {
-        const auto packs = scheduled.packs->of_colour(colour);
-        const auto n = packs.size();
-        for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
-          relax_pack(scheduled.packs->lanes[packs[i]], packs[i], contacts, omega.near);
-        if (n > 0) workers_.barrier();
-      }
-      const auto begin = plan.colour_begins[colour];
-      const auto n = std::size_t{plan.colour_begins[colour + 1]} - begin;
-      for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
-        const Group g = plan.groups[begin + i];
-        if (has_serial_ && serial_stamp_[g] == current_) continue;
-        relax(plan, g, contacts, omega);
-      }
-      if (n > 0) workers_.barrier();
-      if (!has_serial_ || n == 0) continue;
-      if (w == 0)
-        for (std::size_t i = 0; i < n; ++i) {
-          const Group g = plan.groups[begin + i];
-          if (serial_stamp_[g] == current_) relax(plan, g, contacts, omega);
-        }
-      workers_.barrier();
+  for (std::size_t colour = 0; colour < tissue_.groups().colour_count(); ++colour) {
+    if (scheduled.packs != nullptr) {
+      const auto packs = scheduled.packs->of_colour(colour);
+      workers_.for_each(packs.size(), kPacksInARow, [&](std::size_t i, unsigned) {
+        relax_pack(scheduled.packs->lanes[packs[i]], packs[i], contacts, omega.near);
+      });
     }
-  });
+    const auto groups = plan.of_colour(colour);
+    const auto is_serial = [&](Group g) { return has_serial_ && serial_stamp_[g] == current_; };
+    workers_.for_each(groups.size(), kSweptInARow, [&](std::size_t i, unsigned) {
+      if (!is_serial(groups[i])) relax(plan, groups[i], contacts, omega);
+    });
+    if (!has_serial_) continue;
+    for (const auto g : groups)
+      if (is_serial(g)) relax(plan, g, contacts, omega);
+  }
 }
 
 double BlockDescent::sum_of_squares(const SweepPlan& core) const {

@@ -94,6 +94,9 @@ class BlockDescent {
   BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers = 1,
                StrainScheme scheme = StrainScheme::Implicit);
 
+  // Of the workers that there are so many work from the next step on.
+  void use_workers(unsigned count) { workers_.use(count); }
+
   // Takes displacements, velocities and classes anew: after a restored state, or whenever somebody
   // else than solve() changed them for more than single nodes.
   void read_state(const world::World& world);
@@ -233,12 +236,11 @@ class BlockDescent {
   };
   Restored restore_rejected(world::World& world);
   Vec3f start_of(Slot slot) const;
+  static constexpr std::size_t kGroupsInARow = 16;  // of one worker; less than a microsecond each
   template <typename Task>
   void for_each_group(std::span<const Group> groups, Task&& task) {
-    workers_.run([&](unsigned w) {
-      const auto n = groups.size(), count = std::size_t{workers_.count()};
-      for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(groups[i]);
-    });
+    workers_.for_each(groups.size(), kGroupsInARow,
+                      [&](std::size_t i, unsigned) { task(groups[i]); });
   }
 
   const organ::Organ& organ_;

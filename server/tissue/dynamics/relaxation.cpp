@@ -11,6 +11,8 @@
 namespace trocar::dynamics {
 namespace {
 
+constexpr std::size_t kBlocksInARow = 4;  // of one worker: some microseconds
+
 Vec8 times(const SymMat8& m, const Vec8& v) {
   return {fma8(m.xz, v.z, fma8(m.xy, v.y, m.xx * v.x)),
           fma8(m.yz, v.z, fma8(m.yy, v.y, m.xy * v.x)),
@@ -206,22 +208,22 @@ void Relaxation::settle(const Float4* x, world::RelaxationState& state) {
   is_stale_ = true;
 }
 
-void Relaxation::begin_all(const world::RelaxationState& state, unsigned w, unsigned count) {
-  const auto of_worker = [&](std::size_t n, auto&& task) {
-    for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(i);
-  };
-  of_worker(blocks_.size(), [&](std::size_t i) { begin_block(i, state.tets(), scratch_[w]); });
+void Relaxation::begin_all(const world::RelaxationState& state, Workers& workers) {
+  workers.for_each(blocks_.size(), kBlocksInARow,
+                   [&](std::size_t i, unsigned w) { begin_block(i, state.tets(), scratch_[w]); });
   if (nodal_relaxation_)
-    of_worker(nodal_relaxation_->block_count(), [&](std::size_t i) {
-      nodal_relaxation_->begin_block(i, state.nodal(), scratch_[w]);
-    });
+    workers.for_each(nodal_relaxation_->block_count(), kBlocksInARow,
+                     [&](std::size_t i, unsigned w) {
+                       nodal_relaxation_->begin_block(i, state.nodal(), scratch_[w]);
+                     });
 }
 
 void Relaxation::refresh(const world::RelaxationState& state) {
   if (is_stale_) {  // it was read while all slept, and no step has begun since
     if (terms_.dt() == 0) set_dt(kTickSeconds);
     scratch_.resize(std::max<std::size_t>(scratch_.size(), 1));
-    begin_all(state, 0, 1);
+    Workers alone(1);
+    begin_all(state, alone);
     is_stale_ = false;
     stale_.clear();
     if (nodal_relaxation_) nodal_relaxation_->clear_stale();
@@ -238,8 +240,8 @@ void Relaxation::refresh(const world::RelaxationState& state) {
 void Relaxation::begin_step(float dt, const world::RelaxationState& state, Workers& workers) {
   TROCAR_ASSERT(state.tets().block_count() >= blocks_.size());
   if (dt != terms_.dt()) set_dt(dt);
-  scratch_.resize(workers.count());
-  differences_.resize(workers.count());
+  scratch_.resize(workers.most());
+  differences_.resize(workers.most());
   if (!is_stale_) {
     refresh(state);
     return;
@@ -247,7 +249,7 @@ void Relaxation::begin_step(float dt, const world::RelaxationState& state, Worke
   is_stale_ = false;
   stale_.clear();
   if (nodal_relaxation_) nodal_relaxation_->clear_stale();
-  workers.run([&](unsigned w) { begin_all(state, w, workers.count()); });
+  begin_all(state, workers);
 }
 
 void Relaxation::list_due(std::span<const GroupLanes> nodes, std::uint8_t step) {
@@ -279,16 +281,13 @@ void Relaxation::end_step(const Float4* x, std::span<const GroupLanes> nodes,
                           world::RelaxationState& state, Workers& workers) {
   state.begin_step();
   list_due(nodes, state.step());
-  workers.run([&](unsigned w) {
-    const auto n = due_.size(), count = std::size_t{workers.count()};
-    std::array<std::uint64_t, 2> differences{};
-    for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
-      if (due_[i] < blocks_.size())
-        differences[0] += end_block(due_[i], x, state.tets(), scratch_[w]);
-      else
-        differences[1] +=
-            nodal_relaxation_->end_block(due_[i] - blocks_.size(), state.nodal(), scratch_[w]);
-    differences_[w] = differences;
+  std::ranges::fill(differences_, std::array<std::uint64_t, 2>{});
+  workers.for_each(due_.size(), kBlocksInARow, [&](std::size_t i, unsigned w) {
+    auto& [of_tets, nodal] = differences_[w];
+    if (due_[i] < blocks_.size())
+      of_tets += end_block(due_[i], x, state.tets(), scratch_[w]);
+    else
+      nodal += nodal_relaxation_->end_block(due_[i] - blocks_.size(), state.nodal(), scratch_[w]);
   });
   for (const auto& [of_tets, nodal] : differences_) {
     state.tets().add_to_hash(of_tets);

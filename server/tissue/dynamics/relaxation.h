@@ -116,7 +116,7 @@ class Relaxation {
                   const SymMat8& relaxed_stress);
   void set_loads(const Block& block, std::size_t index, const SymMat8& relaxed_stress);
   // A share of the blocks: that of worker w of so many.
-  void begin_all(const world::RelaxationState& state, unsigned w, unsigned count);
+  void begin_all(const world::RelaxationState& state, Workers& workers);
   void begin_block(std::size_t index, const world::StressHistory& history,
                    RelaxationTerms::Constants& scratch);
   // The hash's difference.

@@ -16,7 +16,7 @@ Status validate(const TickDecisions& decisions);
 
 class Simulation {
  public:
-  // workers: threads that share the solver's work; results do not depend on it.
+  // workers: threads that may share the solver's work; results do not depend on it.
   // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
   // self-contact, and its states cannot be restored.
   // loads: what acts besides tools, of a scenario that validate() accepts.
@@ -34,6 +34,10 @@ class Simulation {
   // tissue a node feels its own mass more than its neighbours in a tick: three sweeps where it is
   // touched, and fewer beyond, keep contact forces as near to the solved ones as more everywhere.
   TickDecisions with_sweeps_for_organ(TickDecisions decisions) const;
+
+  unsigned workers() const { return workers_; }
+  // So many of them share the work from now on; at first, and after a return to a mark, all.
+  void use_workers(unsigned count) { context_->solve.solver.use_workers(count); }
 
   // Simulates one tick. After a tick that publishes, pop_frame() has the frame. Returning to a
   // mark costs as much as beginning a session.
