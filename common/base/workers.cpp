@@ -13,8 +13,13 @@ constexpr int kHelperSpins = 2000;  // some 30 us: longer than what lies between
 constexpr int kCallerSpins = 500;   // longer than a chunk takes
 constexpr std::size_t kWorthWaking = 8;  // chunks
 constexpr std::uint64_t kLeft = 0xffffffff;
+constexpr unsigned kMostUsable = 8;
 
 }  // namespace
+
+unsigned usable_workers() {
+  return std::clamp(std::thread::hardware_concurrency(), 1u, kMostUsable);
+}
 
 Workers::Workers(unsigned most)
     : most_(std::clamp(most, 1u, kMaxWorkers)), count_(most_), shares_(most_) {

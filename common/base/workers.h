@@ -19,6 +19,9 @@ namespace trocar {
 
 inline constexpr unsigned kMaxWorkers = 64;
 
+// Returns how many may help in a tick: one for each processor, but more than eight gain little.
+unsigned usable_workers();
+
 class Workers {
  public:
   explicit Workers(unsigned most);

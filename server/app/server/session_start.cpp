@@ -1,10 +1,8 @@
 #include "server/app/server/session_start.h"
 
-#include <algorithm>
-#include <thread>
-
 #include "common/base/log.h"
 #include "common/base/timing.h"
+#include "common/base/workers.h"
 #include "server/organs/catalogue/hidden_structures.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
@@ -14,15 +12,12 @@
 namespace trocar::app {
 namespace {
 
-constexpr unsigned kMostHelpers = 8;  // more gain little in one tick
-
 double seconds_since(std::uint64_t begin_ns) {
   return static_cast<double>(monotonic_ns() - begin_ns) * 1e-9;
 }
 
 unsigned most_workers(const ServerOptions& options) {
-  if (options.workers > 0) return options.workers;
-  return std::clamp(std::thread::hardware_concurrency(), 1u, kMostHelpers);
+  return options.workers > 0 ? options.workers : usable_workers();
 }
 
 Result<organ::Organ> read_organ(const ServerOptions& options) {

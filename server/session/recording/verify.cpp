@@ -7,6 +7,7 @@
 #include "common/base/json.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
+#include "common/base/workers.h"
 #include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verifier.h"
@@ -89,7 +90,8 @@ Result<VerifyReport> verify_journal(const std::string& path,
 
   std::optional<dynamics::StrainScheme> scheme;
   if (info.has_implicit_strain) scheme = dynamics::StrainScheme::Implicit;
-  auto simulation = step::Simulation(std::move(*organ), 1, {}, std::move(*loads), scheme);
+  auto simulation =
+      step::Simulation(std::move(*organ), usable_workers(), {}, std::move(*loads), scheme);
   Verifier verifier(info, std::move(simulation), std::move(*bleeding), report);
   const auto lists = (*journal)->read_participants(0, std::numeric_limits<Tick>::max(),
                                                    [&](Tick tick, const proto::Participants& list) {
