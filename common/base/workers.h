@@ -55,8 +55,8 @@ class Workers {
     void* body = nullptr;
     std::size_t n = 0, grain = 1;
   };
-  // What a worker begins with: the chunks up to `end`, of which the low half of the ticket tells
-  // how many are left. The high half numbers loops.
+  // A share is what a worker begins with: the chunks up to `end`, of which the low half of the
+  // ticket tells how many are left. The high half numbers loops.
   struct alignas(64) Share {
     std::atomic<std::uint64_t> ticket{0};
     std::atomic<std::size_t> end{0};
@@ -76,7 +76,7 @@ class Workers {
   std::atomic<unsigned> count_;
   std::vector<Share> shares_;  // per worker
   std::vector<std::thread> threads_;
-  // The loop. A helper may read it while the next one is written; then it gets no chunk of it.
+  // A helper may read the loop while the next one is written; then it gets no chunk of it.
   std::atomic<Function> function_{nullptr};
   std::atomic<void*> body_{nullptr};
   std::atomic<std::size_t> n_{0}, grain_{1};

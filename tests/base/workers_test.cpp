@@ -31,7 +31,7 @@ TEST(Workers, DoEachItemOnceInATeamThatChanges) {
   }
 }
 
-// What a loop writes, the caller and the next loop read.
+// The caller and the next loop read what a loop has written.
 TEST(Workers, ALoopSeesWhatTheOneBeforeItDid) {
   Workers workers(3);
   std::vector<std::uint64_t> values(500, 1), sums(500);

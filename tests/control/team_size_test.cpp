@@ -35,7 +35,7 @@ TEST(TeamSize, OneWorksWhileThatIsEnough) {
 TEST(TeamSize, GrowsUntilTicksHaveTheirTime) {
   TeamSize team(8);
   EXPECT_EQ(team_after(team, 2000, [](unsigned n) { return shared(1.3, n); }), 2);
-  // 3.6 with one thread: 1.17 with four, 0.77 with eight.
+  // It takes 1.17 with four threads, and 0.77 with eight.
   EXPECT_EQ(team_after(team, 4000, [](unsigned n) { return shared(3.6, n); }), 8);
 }
 
@@ -52,7 +52,7 @@ TEST(TeamSize, HasNoMoreThanThereMayBe) {
   EXPECT_EQ(team_after(alone, 4000, cost), 1);
 }
 
-// Where other programs have the other processors a bigger team is slower.
+// A bigger team is slower where other programs have the other processors.
 TEST(TeamSize, StaysAloneWhereThereAreNoFreeProcessors) {
   TeamSize team(8);
   int ticks_with_more = 0;

@@ -44,7 +44,7 @@ constexpr std::size_t kUsualSweeps = 64;
 constexpr int kRestoredLayers = 3;
 // Drag is so many times the inertia that would do for domains that are folded or drawn out.
 constexpr float kDrag = 2;
-// What one worker sweeps in a row: some microseconds.
+// One worker sweeps so many in a row: some microseconds.
 constexpr std::size_t kSweptInARow = 4, kPacksInARow = 2;
 
 // Returns the mean velocity of who shares a smoothing domain with each node; velocities: per slot.

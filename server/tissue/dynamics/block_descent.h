@@ -94,7 +94,7 @@ class BlockDescent {
   BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers = 1,
                StrainScheme scheme = StrainScheme::Implicit);
 
-  // Of the workers that there are so many work from the next step on.
+  // From the next step on so many of the workers work.
   void use_workers(unsigned count) { workers_.use(count); }
 
   // Takes displacements, velocities and classes anew: after a restored state, or whenever somebody

@@ -36,7 +36,7 @@ class Simulation {
   TickDecisions with_sweeps_for_organ(TickDecisions decisions) const;
 
   unsigned workers() const { return workers_; }
-  // So many of them share the work from now on; at first, and after a return to a mark, all.
+  // From now on so many of them share the work; at first, and after a return to a mark, all do.
   void use_workers(unsigned count) { context_->solve.solver.use_workers(count); }
 
   // Simulates one tick. After a tick that publishes, pop_frame() has the frame. Returning to a
