@@ -128,6 +128,20 @@ test('messages that are too large or of another kind end that watcher, and nobod
   await close(quiet);
 });
 
+test('a page whose first connection breaks before it is let in tries again', async () => {
+  const page = await world.context.newPage();
+  await page.addInitScript(() => {
+    const Real = window.WebSocket;
+    let tries = 0;
+    window.WebSocket = class extends Real {
+      constructor(url) { super(++tries < 3 ? url.replace(/session$/, 'nothing') : url); }
+    };
+  });
+  await page.goto(link(world.server.codes.observer, 'observer', 'Patient'));
+  await live(page);
+  await close(page);
+});
+
 test('who loses the connection comes back to the same place', async () => {
   const page = await openPage(link(world.server.codes.observer, 'observer', 'Bea'));
   await live(page);

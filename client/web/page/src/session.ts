@@ -15,6 +15,8 @@ export interface Hooks {
 }
 
 const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
+// A server that is busy may take long to let somebody in, and one that has just begun may not hear yet.
+const kJoinSilenceMs = 15_000, kJoinTries = 4;
 // Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
 const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36, 40, 80]);
 
@@ -34,6 +36,7 @@ export class Session {
   private offsets: { roundTrip: number; offset: number }[] = [];
   private timer = 0;
   private retryMs = 200;
+  private joinTries = 0;
   private hasLeft = false;
 
   constructor(private readonly link: Link, private readonly replica: Replica, private readonly hooks: Hooks) {
@@ -175,22 +178,29 @@ export class Session {
   private lost(why: string): void {
     this.socket = null;
     if (this.state === 'ended') return;
-    if (this.state === 'joining') return this.end('The server does not answer: is it running, and is the link right?');
+    if (this.state === 'joining') {
+      if (++this.joinTries >= kJoinTries) return this.end('The server does not answer: is it running, and is the link right?');
+      return this.retryLater();
+    }
     const now = performance.now();
     if (this.state !== 'away') this.awaySince = now;
     if (now - this.awaySince > (this.keepSeconds + 5) * 1000)
       return this.end('The connection was lost for too long. Open the link again.');
     this.set('away', why);
+    this.retryLater();
+  }
+  private retryLater(): void {
     window.setTimeout(this.retryNow, this.retryMs);
     this.retryMs = Math.min(2000, this.retryMs * 2);
   }
   private retryNow = (): void => {
-    if (this.state === 'away' && this.socket === null) this.connect();
+    if (this.state !== 'live' && this.state !== 'ended' && this.socket === null) this.connect();
   };
 
   private tick(): void {
     if (this.socket === null) return;
-    if (performance.now() - this.heardMs > kSilenceMs && this.state !== 'ended') {
+    const patience = this.state === 'joining' ? kJoinSilenceMs : kSilenceMs;
+    if (performance.now() - this.heardMs > patience && this.state !== 'ended') {
       const silent = this.socket;
       this.lost('Nothing has come for too long.');
       silent.close(4000); // not in order: the session keeps the place
