@@ -17,8 +17,9 @@ double shared(double work, unsigned threads) {
 }
 
 // Returns the mean of how many worked in the last tenth of these ticks.
-double team_after(TeamSize& team, int ticks, const Cost& cost) {
+double team_after(TeamSize& team, int ticks, const Cost& cost, double free = 8) {
   double sum = 0;
+  team.set_free(free);
   for (int i = 0; i < ticks; ++i) {
     if (i >= ticks - ticks / 10) sum += team.count();
     const double load = cost(team.count());
@@ -52,6 +53,16 @@ TEST(TeamSize, HasNoMoreThanThereMayBe) {
   EXPECT_EQ(team_after(alone, 4000, cost), 1);
 }
 
+TEST(TeamSize, TriesNobodyWithoutAFreeProcessor) {
+  TeamSize team(8);
+  EXPECT_EQ(team_after(
+                team, 4000, [](unsigned n) { return shared(3.6, n); }, 0.4),
+            1);
+  EXPECT_EQ(team_after(
+                team, 4000, [](unsigned n) { return shared(3.6, n); }, 0.6),
+            2);
+}
+
 // A bigger team is slower where other programs have the other processors.
 TEST(TeamSize, StaysAloneWhereThereAreNoFreeProcessors) {
   TeamSize team(8);
@@ -67,7 +78,9 @@ TEST(TeamSize, StaysAloneWhereThereAreNoFreeProcessors) {
 TEST(TeamSize, GivesBackProcessorsThatOthersTake) {
   TeamSize team(4);
   EXPECT_EQ(team_after(team, 4000, [](unsigned n) { return shared(3.6, n); }), 4);
-  EXPECT_NEAR(team_after(team, 60'000, [](unsigned n) { return n == 1 ? 3.6 : 3.6 + n; }), 1, 0.1);
+  EXPECT_NEAR(team_after(
+                  team, 60'000, [](unsigned n) { return n == 1 ? 3.6 : 3.6 + n; }, 0),
+              1, 0.1);
   EXPECT_NEAR(team_after(team, 60'000, [](unsigned n) { return shared(3.6, n); }), 4, 0.1);
 }
 

@@ -36,13 +36,19 @@ void TeamSize::observe(double load, bool is_short) {
 }
 
 unsigned TeamSize::next_other() const {
-  const unsigned more = std::min(most_, 2 * team_), fewer = (team_ + 1) / 2;
+  const unsigned most_more = std::min(most_, 2 * team_), fewer = (team_ + 1) / 2;
+  const bool are_free = free_ >= kFreeEach * (most_more - team_);
+  const unsigned more = are_free ? most_more : team_;
   if (more == team_) return fewer;
   return tries_fewer_ && fewer != team_ ? fewer : more;
 }
 
 void TeamSize::begin_trial() {
   other_ = next_other();
+  if (other_ == team_) {
+    other_ = 0;
+    return;
+  }
   tried_ticks_ = 0;
   sides_ = {};
 }

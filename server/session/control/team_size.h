@@ -10,7 +10,8 @@
 //   trial    while the last 64 ticks or so were short of time, more than half of them, one begins
 //            kSoon ticks after one that changed something, and after one that did not, twice as
 //            late as the last time, up to kLate. It is of twice as many threads; or of half as many
-//            where there are no more, or after a trial of more that changed nothing. kBlocks times
+//            where there are no more, or after a trial of more that changed nothing. There are more
+//            while each has at least kFreeEach of a processor that nobody uses. kBlocks times
 //            kBlockTicks heavy ticks are done in turn with the team as it is and as it might be;
 //   keep     more where they took at most kWorthwhile of the time, fewer where they took at most
 //            kAsGood, each without its dearest block, so that a stall decides nothing.
@@ -26,7 +27,7 @@ class TeamSize {
   static constexpr double kLightLoad = 0.25, kHeavyLoad = 0.35;
   static constexpr std::uint32_t kBlocks = 16, kBlockTicks = 16;
   static constexpr std::uint32_t kSoon = 250, kLate = 16'000;
-  static constexpr double kWorthwhile = 0.9, kAsGood = 1.03;
+  static constexpr double kWorthwhile = 0.9, kAsGood = 1.03, kFreeEach = 0.5;
 
   // most: threads that there may be.
   explicit TeamSize(unsigned most) : most_(most) {}
@@ -36,9 +37,12 @@ class TeamSize {
   // After each tick. load: what it took, in ticks of real time. is_short: something was given up
   // for time in it, or time fell behind.
   void observe(double load, bool is_short);
+  // Tells how many processors stood idle lately, in the mean; none at first.
+  void set_free(double processors) { free_ = processors; }
 
  private:
   bool is_other_turn() const { return other_ != 0 && tried_ticks_ / kBlockTicks % 2 == 1; }
+  // Returns whom to try; the team itself where there is nobody.
   unsigned next_other() const;
   void begin_trial();
   void end_trial();
@@ -54,7 +58,7 @@ class TeamSize {
   };
   std::array<Side, 2> sides_;
   std::uint32_t since_trial_ = kSoon, wait_ = kSoon;
-  double short_share_ = 0;
+  double short_share_ = 0, free_ = 0;
   bool is_light_ = true;
   bool tries_fewer_ = false;
 };
