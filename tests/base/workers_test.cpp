@@ -63,8 +63,7 @@ TEST(Workers, OneAloneDoesAllInOrder) {
   EXPECT_EQ(order, expected);
 }
 
-// Many more threads than cores: a helper that does not run holds up nobody for long.
-TEST(Workers, AreNotHeldUpByThoseWhoDoNotRun) {
+TEST(Workers, DoAllWithManyMoreThreadsThanProcessors) {
   Workers workers(32);
   std::atomic<std::uint64_t> sum{0};
   for (int round = 0; round < 300; ++round) {

@@ -17,9 +17,9 @@ double shared(double work, unsigned threads) {
 }
 
 // Returns the mean of how many worked in the last tenth of these ticks.
-double team_after(TeamSize& team, int ticks, const Cost& cost, double free = 8) {
+double team_after(TeamSize& team, int ticks, const Cost& cost, double idle = 8) {
   double sum = 0;
-  team.set_free(free);
+  team.set_idle(idle);
   for (int i = 0; i < ticks; ++i) {
     if (i >= ticks - ticks / 10) sum += team.count();
     const double load = cost(team.count());
@@ -53,7 +53,7 @@ TEST(TeamSize, HasNoMoreThanThereMayBe) {
   EXPECT_EQ(team_after(alone, 4000, cost), 1);
 }
 
-TEST(TeamSize, TriesNobodyWithoutAFreeProcessor) {
+TEST(TeamSize, TriesNobodyWithoutAnIdleProcessor) {
   TeamSize team(8);
   EXPECT_EQ(team_after(
                 team, 4000, [](unsigned n) { return shared(3.6, n); }, 0.4),
@@ -64,7 +64,7 @@ TEST(TeamSize, TriesNobodyWithoutAFreeProcessor) {
 }
 
 // A bigger team is slower where other programs have the other processors.
-TEST(TeamSize, StaysAloneWhereThereAreNoFreeProcessors) {
+TEST(TeamSize, StaysAloneWhereThereAreNoIdleProcessors) {
   TeamSize team(8);
   int ticks_with_more = 0;
   const Cost cost = [&](unsigned n) {

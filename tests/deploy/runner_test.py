@@ -53,6 +53,9 @@ class Quiet:
     def test_ended(self, program, result, cost):
         self.heard.append(result.name)
 
+    def test_is_tried_again(self, name):
+        self.heard.append("again " + name)
+
 
 class Running(unittest.TestCase):
     def setUp(self):

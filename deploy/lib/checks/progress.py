@@ -33,6 +33,12 @@ class Progress:
                 self._said = now
                 print(self.line(now), file=self.stream, flush=True)
 
+    def test_is_tried_again(self, name: str) -> None:
+        with self._lock:
+            self.tests += 1
+            self._clear()
+            print(f"trying again, by itself: {name}", file=self.stream, flush=True)
+
     def line(self, now: float) -> str:
         text = f"test {self.ended:,} of {self.tests:,}"
         if self.failed:

@@ -133,6 +133,7 @@ class Runner:
         for first in [result for result in job.results if result.outcome == "failed" and result.name in job.names]:
             if self.stopped.is_set():
                 return
+            self.progress.test_is_tried_again(first.name)
             again = Job(job.test, [first.name], 0)
             self._run_job(again)
             job.cpu_seconds += again.cpu_seconds

@@ -175,7 +175,7 @@ bool SimulationLoop::run_tick() {
     const auto ticks = static_cast<float>(kTicksPerSecond);
     time_rate_ = ticks / (ticks + static_cast<float>(slow_ticks_ - slow_ticks_before_));
     slow_ticks_before_ = slow_ticks_;
-    if (team_size_) team_size_->set_free(free_processors_.read());
+    if (team_size_) team_size_->set_idle(idle_processors_.read());
   }
   if (report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod)
     record_snapshot();

@@ -20,7 +20,7 @@
 
 #include "common/base/timing.h"
 #include "server/app/server/frame_handover.h"
-#include "server/app/server/free_processors.h"
+#include "server/app/server/idle_processors.h"
 #include "server/app/server/journal_sink.h"
 #include "server/app/server/pacer.h"
 #include "server/session/bleeding/bleeding.h"
@@ -126,7 +126,7 @@ class SimulationLoop {
   control::DepthChooser chooser_;    // of a calibrated organ, unless decisions are fixed
   control::BladeWaits blade_waits_;  // unless decisions are fixed
   std::optional<control::TeamSize> team_size_;
-  FreeProcessors free_processors_;
+  IdleProcessors idle_processors_;
   std::vector<double> forces_n_;         // of the tools that touched in the last tick
   std::uint64_t lateness_ns_ = 0;        // of the tick about to run
   std::uint64_t slow_ticks_before_ = 0;  // until the last full second

@@ -3,17 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/checksum.h"
+#include "common/base/hash_array.h"
 
 namespace trocar::finite_elements {
 namespace {
-
-template <typename T>
-void add(StateHasher& hasher, const std::vector<T>& values) {
-  const std::uint64_t count = values.size();
-  hasher.update(bytes_of(std::span(&count, 1)));
-  hasher.update(bytes_of(values));
-}
 
 std::vector<double> numbers_of(const material::HyperelasticMaterial& m) {
   std::vector<double> numbers{static_cast<double>(m.energy), static_cast<double>(m.split),
@@ -74,13 +67,13 @@ Status validate(const Problem& p) {
 
 std::uint64_t hash_of(const Problem& p) {
   StateHasher hasher;
-  add(hasher, p.mesh.rest_positions);
-  add(hasher, p.mesh.nodes);
-  add(hasher, p.element_materials);
-  add(hasher, p.held_dofs);
-  add(hasher, p.densities_kg_m3);
-  add(hasher, std::vector<double>{p.damping_per_s});
-  for (const auto& material : p.materials) add(hasher, numbers_of(material));
+  hash_array(hasher, p.mesh.rest_positions);
+  hash_array(hasher, p.mesh.nodes);
+  hash_array(hasher, p.element_materials);
+  hash_array(hasher, p.held_dofs);
+  hash_array(hasher, p.densities_kg_m3);
+  hash_array(hasher, std::vector<double>{p.damping_per_s});
+  for (const auto& material : p.materials) hash_array(hasher, numbers_of(material));
   return hasher.digest();
 }
 

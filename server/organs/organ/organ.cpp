@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/base/bytes.h"
-#include "common/base/checksum.h"
+#include "common/base/hash_array.h"
 #include "server/organs/material/material_keys.h"
 
 namespace trocar::organ {
@@ -195,13 +195,6 @@ std::vector<double> numbers_of(const material::Material& m) {
   for (const auto& [weight, time_s] : m.measured.relaxation)
     numbers.insert(numbers.end(), {weight, time_s});
   return numbers;
-}
-
-template <typename T>
-void hash_array(StateHasher& hasher, const std::vector<T>& values) {
-  const std::uint64_t count = values.size();
-  hasher.update(bytes_of(std::span(&count, 1)));
-  hasher.update(bytes_of(values));
 }
 
 }  // namespace

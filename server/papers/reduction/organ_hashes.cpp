@@ -1,16 +1,9 @@
 #include "server/papers/reduction/organ_hashes.h"
 
-#include "common/base/checksum.h"
+#include "common/base/hash_array.h"
 
 namespace trocar::reduction {
 namespace {
-
-template <typename T>
-void add(StateHasher& hasher, const std::vector<T>& values) {
-  const std::uint64_t count = values.size();
-  hasher.update(bytes_of(std::span(&count, 1)));
-  hasher.update(bytes_of(values));
-}
 
 std::vector<double> elasticity_of(const material::Material& m) {
   std::vector<double> numbers{static_cast<double>(m.elastic_law), m.tension, m.fibre_tension};
@@ -32,22 +25,22 @@ std::vector<double> elasticity_of(const material::Material& m) {
 
 std::uint64_t mesh_hash(const organ::Organ& organ) {
   StateHasher hasher;
-  add(hasher, organ.mesh.rest_positions);
-  add(hasher, organ.mesh.tets);
-  add(hasher, organ.fixed_nodes);
+  hash_array(hasher, organ.mesh.rest_positions);
+  hash_array(hasher, organ.mesh.tets);
+  hash_array(hasher, organ.fixed_nodes);
   return hasher.digest();
 }
 
 std::uint64_t elasticity_hash(const organ::Organ& organ) {
   StateHasher hasher;
-  add(hasher, elasticity_of(organ.material));
+  hash_array(hasher, elasticity_of(organ.material));
   for (const auto& region : organ.regions) {
-    add(hasher, elasticity_of(region.material));
-    add(hasher, region.nodes);
-    if (!region.tets.empty()) add(hasher, region.tets);
+    hash_array(hasher, elasticity_of(region.material));
+    hash_array(hasher, region.nodes);
+    if (!region.tets.empty()) hash_array(hasher, region.tets);
   }
-  add(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
-  add(hasher, organ.stress_free_positions_m);
+  hash_array(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
+  hash_array(hasher, organ.stress_free_positions_m);
   return hasher.digest();
 }
 

@@ -37,8 +37,8 @@ void TeamSize::observe(double load, bool is_short) {
 
 unsigned TeamSize::next_other() const {
   const unsigned most_more = std::min(most_, 2 * team_), fewer = (team_ + 1) / 2;
-  const bool are_free = free_ >= kFreeEach * (most_more - team_);
-  const unsigned more = are_free ? most_more : team_;
+  const bool are_idle = idle_ >= kIdleEach * (most_more - team_);
+  const unsigned more = are_idle ? most_more : team_;
   if (more == team_) return fewer;
   return tries_fewer_ && fewer != team_ ? fewer : more;
 }

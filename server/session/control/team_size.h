@@ -11,7 +11,7 @@
 //            kSoon ticks after one that changed something, and after one that did not, twice as
 //            late as the last time, up to kLate. It is of twice as many threads; or of half as many
 //            where there are no more, or after a trial of more that changed nothing. There are more
-//            while each has at least kFreeEach of a processor that nobody uses. kBlocks times
+//            while each has at least kIdleEach of a processor that nobody uses. kBlocks times
 //            kBlockTicks heavy ticks are done in turn with the team as it is and as it might be;
 //   keep     more where they took at most kWorthwhile of the time, fewer where they took at most
 //            kAsGood, each without its dearest block, so that a stall decides nothing.
@@ -27,7 +27,7 @@ class TeamSize {
   static constexpr double kLightLoad = 0.25, kHeavyLoad = 0.35;
   static constexpr std::uint32_t kBlocks = 16, kBlockTicks = 16;
   static constexpr std::uint32_t kSoon = 250, kLate = 16'000;
-  static constexpr double kWorthwhile = 0.9, kAsGood = 1.03, kFreeEach = 0.5;
+  static constexpr double kWorthwhile = 0.9, kAsGood = 1.03, kIdleEach = 0.5;
 
   // most: threads that there may be.
   explicit TeamSize(unsigned most) : most_(most) {}
@@ -38,7 +38,7 @@ class TeamSize {
   // for time in it, or time fell behind.
   void observe(double load, bool is_short);
   // Tells how many processors stood idle lately, in the mean; none at first.
-  void set_free(double processors) { free_ = processors; }
+  void set_idle(double processors) { idle_ = processors; }
 
  private:
   bool is_other_turn() const { return other_ != 0 && tried_ticks_ / kBlockTicks % 2 == 1; }
@@ -58,7 +58,7 @@ class TeamSize {
   };
   std::array<Side, 2> sides_;
   std::uint32_t since_trial_ = kSoon, wait_ = kSoon;
-  double short_share_ = 0, free_ = 0;
+  double short_share_ = 0, idle_ = 0;
   bool is_light_ = true;
   bool tries_fewer_ = false;
 };

@@ -256,7 +256,7 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads,
   } else {
     for_each_group(far_swept_.groups, [&](Group g) { ask_energies(g, x_.data()); });
   }
-  // Linear groups ask when their forces do not do, which is rare.
+  // Linear groups ask when their forces do not do: rarely at rest, mostly where tips stir tissue.
   const NearBand& all_near = last_band(bands);
   for_each_group(has_packs_ ? all_near.kept.groups : near_.groups,
                  [&](Group g) { ask_energies(g, x_.data()); });

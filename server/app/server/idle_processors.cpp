@@ -1,4 +1,4 @@
-#include "server/app/server/free_processors.h"
+#include "server/app/server/idle_processors.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -11,13 +11,13 @@
 
 namespace trocar::app {
 
-FreeProcessors::FreeProcessors() : file_(::open("/proc/stat", O_RDONLY | O_CLOEXEC)) {}
+IdleProcessors::IdleProcessors() : file_(::open("/proc/stat", O_RDONLY | O_CLOEXEC)) {}
 
-FreeProcessors::~FreeProcessors() {
+IdleProcessors::~IdleProcessors() {
   if (file_ >= 0) ::close(file_);
 }
 
-double FreeProcessors::read() {
+double IdleProcessors::read() {
   std::array<char, 256> text{};
   if (file_ < 0 || ::pread(file_, text.data(), text.size() - 1, 0) <= 0) return 0;
   // "cpu", then user, nice, system and idle, of all processors together.

@@ -6,12 +6,12 @@
 
 namespace trocar::app {
 
-class FreeProcessors {
+class IdleProcessors {
  public:
-  FreeProcessors();
-  ~FreeProcessors();
-  FreeProcessors(const FreeProcessors&) = delete;
-  FreeProcessors& operator=(const FreeProcessors&) = delete;
+  IdleProcessors();
+  ~IdleProcessors();
+  IdleProcessors(const IdleProcessors&) = delete;
+  IdleProcessors& operator=(const IdleProcessors&) = delete;
 
   // Returns how many stood idle, in the mean since the last call; 0 at the first one, and where
   // nobody knows. Allocates nothing.
