@@ -99,7 +99,7 @@ ui::HudTray tray_of(const Hands::Choice& choice) {
 std::vector<ui::HudParticipant> Picture::participants_of(const replica::Replica& replica,
                                                          const Pane& pane, bool is_replay) {
   std::vector<ui::HudParticipant> participants;
-  const auto waiting = figures_of(replica).pace.rate.waiting_blades;
+  const auto waiting = figures_of(replica).pace.rate.waiting_tools;
   for (const auto& participant : replica.participants()) {
     ui::HudParticipant shown;
     shown.name = participant.name;

@@ -13,22 +13,22 @@ std::string tenths(double value) {
   return std::to_string(whole / 10) + "." + std::to_string(whole % 10);
 }
 
-// Says whose blades are kept waiting; empty: nobody's.
+// Says whose tools are held back; empty: nobody's.
 std::string waiting_text(const HudModel& model) {
   std::string names;
   for (const auto& who : model.participants) {
     if (!who.waits) continue;
-    if (who.is_self) return "Your blade waits: you cut faster than the server can follow.";
+    if (who.is_self) return "Your instrument is held back: it moves faster than the server can follow.";
     names += (names.empty() ? "" : ", ") + who.name;
   }
-  return names.empty() ? "" : "Kept waiting, for cutting faster than the server can: " + names;
+  return names.empty() ? "" : "Held back, for moving faster than the server can follow: " + names;
 }
 
 std::string waiting_advice(const HudModel& model) {
   if (model.conduct) return "Freeze holds the tools of who goes on so.";
   const bool is_own = std::ranges::any_of(model.participants,
                                           [](const auto& who) { return who.is_self && who.waits; });
-  return is_own ? "Draw back a little, and cut more slowly." : "You can go on as you do.";
+  return is_own ? "Draw back a little, and go on more slowly." : "You can go on as you do.";
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ struct HudParticipant {
   bool is_away = false;    // the connection is lost, the place is kept
   bool is_frozen = false;  // an instructor keeps the tools where they are
   bool is_inside = false;  // it appeared inside tissue and touches nothing
-  bool waits = false;      // its blade is kept waiting, or was a moment ago
+  bool waits = false;      // its tool is held back, or was a moment ago
   float force_n = 0, torque_nm = 0;
   std::uint32_t contact_nodes = 0;
   std::vector<float> forces_n;  // over the last seconds, oldest first, evenly spaced

@@ -35,7 +35,7 @@ void draw_doing(const HudParticipant& p) {
                       : p.verb == tool::Verb::None       ? replica::name_of(p.role)
                       : !p.has_claim                     ? "refused"
                       : p.is_inside                      ? "inside tissue"
-                      : p.waits                          ? "waits"
+                      : p.waits                          ? "held back"
                       : p.verb == tool::Verb::Grasp      ? "grasps"
                       : p.verb == tool::Verb::Cut        ? "cuts"
                       : p.form == tool::Form::Suction    ? "sucks"

@@ -34,5 +34,10 @@ struct Pose {
   Vec3f apply_inverse(const Vec3f& p) const { return rotate(conjugate(orientation), p - position); }
   constexpr bool operator==(const Pose&) const = default;
 };
+// Returns the pose at part t of the way from a to b.
+inline Pose part_of_way(const Pose& a, const Pose& b, float t) {
+  if (t >= 1) return b;
+  return {a.position + (b.position - a.position) * t, interpolate(a.orientation, b.orientation, t)};
+}
 
 }  // namespace trocar

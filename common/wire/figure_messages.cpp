@@ -64,7 +64,7 @@ Status read(const proto::RateState& message, FrameFigures& figures) {
   rate.lowered = message.lowered();
   rate.raised = message.raised();
   rate.time_rate = message.time_rate();
-  rate.waiting_blades = message.waiting_blades();
+  rate.waiting_tools = message.waiting_tools();
   if (!is_sane(rate.budget_us) || !is_sane(rate.predicted_us) || !is_sane(rate.time_rate))
     return bad("rate: a time is negative or not finite");
   return {};
@@ -85,7 +85,7 @@ void write(const PaceFigures& figures, proto::FrameState& message) {
   rate.set_lowered(figures.rate.lowered);
   rate.set_raised(figures.rate.raised);
   rate.set_time_rate(figures.rate.time_rate);
-  rate.set_waiting_blades(figures.rate.waiting_blades);
+  rate.set_waiting_tools(figures.rate.waiting_tools);
 }
 
 void write(const FrameFigures& figures, proto::FrameState& message) {

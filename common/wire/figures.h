@@ -80,7 +80,7 @@ struct RateFigures {
   float predicted_us = 0;                 // what the next tick will take
   std::uint64_t lowered = 0, raised = 0;  // steps in the whole session
   float time_rate = 1;                    // simulated time over real time, last second
-  std::uint32_t waiting_blades = 0;       // bits of tools whose blades waited, last second
+  std::uint32_t waiting_tools = 0;        // bits of tools that were held back, last second
 
   bool operator==(const RateFigures&) const = default;
 };

@@ -12,13 +12,11 @@
 
 #include "common/base/program.h"
 #include "common/math/box.h"
-#include "server/app/server/pacer.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/session/control/blade_waits.h"
-#include "server/session/control/rate_controller.h"
 #include "server/tissue/step/simulation.h"
-#include "tests/support/random.h"
+#include "tests/bench/session_clock.h"
+#include "tests/bench/thrown_hands.h"
 
 namespace trocar {
 namespace {
@@ -58,34 +56,6 @@ tool::ToolSample sample_of(const Box<float>& box, const Options& options, std::u
   return {{tip, rotation_from_z({0, 1, 0})}, is_between ? tool::Verb::None : tool::Verb::Cut};
 }
 
-// Places in and around the organ, each at most so far from the one before.
-class ThrownHands {
- public:
-  ThrownHands(const Box<float>& box, float far_m) : box_(box), far_m_(far_m) {
-    box_.grow(kBeyond_m);
-    places_.fill((box_.least + box_.most) * 0.5f);
-  }
-
-  Pose next(std::uint8_t tool) {
-    const auto within = [this](float least, float most) {
-      return least + (most - least) * static_cast<float>(random_.unit());
-    };
-    Vec3f& place = places_[tool];
-    const Vec3f wanted{within(box_.least.x, box_.most.x), within(box_.least.y, box_.most.y),
-                       within(box_.least.z, box_.most.z)};
-    const float way = length(wanted - place);
-    place += (wanted - place) * std::min(1.0f, far_m_ / std::max(way, 1e-6f));
-    const Vec3f shaft{within(-1, 1), within(-1, 1), within(-1, 1)};
-    return {place, rotation_from_z(normalized(shaft, Vec3f{0, 1, 0}))};
-  }
-
- private:
-  Box<float> box_;
-  float far_m_;
-  testing::Random random_{7};
-  std::array<Vec3f, kMaxTools> places_;
-};
-
 double part(const std::vector<double>& sorted, double share) {
   return sorted.empty()
              ? 0
@@ -112,21 +82,20 @@ class Hands {
     if (tick % (is_thrown ? kTicksPerFrame : 4) != 1) return;
     const bool has_left = static_cast<double>(tick) > 1000 * options_.leave_s;
     for (std::uint8_t b = 0; b < options_.blades; ++b) {
-      auto sample = is_thrown
-                        ? tool::ToolSample{thrown_.next(tool_slot({b}, 0).value), tool::Verb::Cut}
-                        : sample_of(box_, options_, b, tick);
+      auto sample = is_thrown ? tool::ToolSample{thrown_.next(tool_slot({b}, 0)), tool::Verb::Cut}
+                              : sample_of(box_, options_, b, tick);
       if (has_left) sample = {{box_.most * 2.0f, {}}, tool::Verb::None};
       inputs.samples.push_back({tool_slot({b}, 0), sample});
       if (!options_.has_tips) continue;
       const auto tip = tool_slot({b}, 1);
-      inputs.samples.push_back({tip, {thrown_.next(tip.value), tool::Verb::Push}});
+      inputs.samples.push_back({tip, {thrown_.next(tip), tool::Verb::Push}});
     }
   }
 
  private:
   Box<float> box_;
   const Options& options_;
-  ThrownHands thrown_;
+  bench::ThrownHands thrown_;
 };
 
 // Says what ticks took and did.
@@ -156,41 +125,6 @@ struct Ticks {
   }
 };
 
-// A session's clock, on which a tick takes its CPU time and nothing else takes any, with the
-// controller that follows it.
-class SessionClock {
- public:
-  explicit SessionClock(const step::Simulation& simulation)
-      : controller_({.highest = simulation.with_sweeps_for_organ({}),
-                     .layer_sweeps = simulation.context().solve.far_plan.with_sweeps(0).sweeps,
-                     .most_far_sweeps = control::kMostFarSweeps}) {}
-
-  step::TickDecisions decisions() const {
-    auto decisions = controller_.decisions();
-    decisions.waiting_blades = waits_.waiting();
-    return decisions;
-  }
-  std::uint64_t slow_ticks() const { return pacer_.slow_ticks(); }
-
-  void pass(const step::Simulation& simulation, const step::TickReport& report) {
-    now_ns_ = std::max(now_ns_, pacer_.due_ns());
-    const auto lateness_ns = now_ns_ - pacer_.due_ns();
-    pacer_.begin_tick(now_ns_);
-    std::uint64_t work_ns = 0;
-    for (const auto ns : report.stage_cpu_ns) work_ns += ns;
-    now_ns_ += work_ns;
-    controller_.observe(report, {work_ns, lateness_ns});
-    waits_.observe(control::read_cutting_speeds(simulation),
-                   static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds));
-  }
-
- private:
-  app::Pacer pacer_{0};
-  std::uint64_t now_ns_ = 0;
-  control::RateController controller_;
-  control::BladeWaits waits_;
-};
-
 void print_distribution(const char* what, std::vector<double>& us) {
   std::ranges::sort(us);
   std::printf("  %s: median %.0f, p99 %.0f, worst %.0f us\n", what, part(us, 0.5), part(us, 0.99),
@@ -207,7 +141,7 @@ void run(organ::Organ organ, const Options& options) {
   hands.join(inputs);
   Ticks ticks;
   double second_us = 0;
-  SessionClock clock(simulation);
+  bench::SessionClock clock(simulation);
   Tick slow_before = 0;
   for (Tick tick = 1; tick <= static_cast<Tick>(options.seconds * 1000); ++tick) {
     hands.move(tick, inputs);

@@ -76,7 +76,7 @@ TEST(BannerText, WhoIsKeptWaitingIsToldSoAndSoAreTheOthers) {
   model.participants = {HudParticipant{.name = "Bo"}, anna};
   auto banners = banners_of(model);
   ASSERT_EQ(banners.size(), 1u);
-  EXPECT_EQ(banners[0].text, "Kept waiting, for cutting faster than the server can: Anna");
+  EXPECT_EQ(banners[0].text, "Held back, for moving faster than the server can follow: Anna");
   EXPECT_EQ(banners[0].advice, "You can go on as you do.");
   model.conduct.emplace();
   EXPECT_EQ(banners_of(model)[0].advice, "Freeze holds the tools of who goes on so.");
@@ -84,8 +84,8 @@ TEST(BannerText, WhoIsKeptWaitingIsToldSoAndSoAreTheOthers) {
   model.participants[1].is_self = true;
   banners = banners_of(model);
   ASSERT_EQ(banners.size(), 1u);
-  EXPECT_EQ(banners[0].text, "Your blade waits: you cut faster than the server can follow.");
-  EXPECT_EQ(banners[0].advice, "Draw back a little, and cut more slowly.");
+  EXPECT_EQ(banners[0].text, "Your instrument is held back: it moves faster than the server can follow.");
+  EXPECT_EQ(banners[0].advice, "Draw back a little, and go on more slowly.");
 }
 
 // A picture may be old and time may stand still: that is what a pause is.

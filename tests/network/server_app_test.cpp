@@ -5,9 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 
 #include "common/journal/mcap_reader.h"
@@ -262,8 +264,9 @@ TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
   EXPECT_EQ(handed, sink.frames);
 }
 
-// On a machine whose ticks take all the time there is.
-TEST(SimulationLoop, a_blade_that_is_too_fast_waits_and_the_recording_knows) {
+// Moves the first tool of slot 1 on a machine whose ticks take all the time there is: it is held
+// back, and all of that is in the recording, which gives the same hashes again.
+void expect_held_back(tool::Verb verb, const std::function<Vec3f(float seconds)>& place) {
   const auto organ = *catalogue::make_liver(1500);
   step::Simulation simulation(organ);
   participants::SimulationInbox inbox;
@@ -277,14 +280,13 @@ TEST(SimulationLoop, a_blade_that_is_too_fast_waits_and_the_recording_knows) {
   join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.1f};
   ASSERT_TRUE(inbox.try_push_join(join));
   for (int tick = 0; tick < 480; ++tick) {
-    const float x = -0.12f + 0.0005f * static_cast<float>(tick);
-    inbox.push_sample(
-        {tool_slot({1}, 0), {{{x, 0, 0}, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
+    const Vec3f tip = place(static_cast<float>(tick) * kTickSeconds);
+    inbox.push_sample({tool_slot({1}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
     loop.run_tick();
   }
   EXPECT_GT(loop.report().rate.waits[2], 100u);
   EXPECT_EQ(loop.report().rate.waits[0], 0u);
-  EXPECT_EQ(sink.frames.back()->figures.pace.rate.waiting_blades, 4u);
+  EXPECT_EQ(sink.frames.back()->figures.pace.rate.waiting_tools, 4u);
 
   step::Simulation again(organ);
   std::uint32_t waited = 0;
@@ -295,10 +297,23 @@ TEST(SimulationLoop, a_blade_that_is_too_fast_waits_and_the_recording_knows) {
       step::TickRecord read;
       ASSERT_TRUE(recording::from_message(message, read).ok());
       ASSERT_EQ(read.decisions, record.decisions);
-      waited |= read.decisions.waiting_blades;
+      waited |= read.decisions.waiting_tools;
       ASSERT_EQ(again.tick(read.inputs, read.decisions).state_hash, record.state_hash);
     }
   EXPECT_EQ(waited, 4u);
+}
+
+TEST(SimulationLoop, a_blade_that_is_too_fast_is_held_back_and_the_recording_knows) {
+  expect_held_back(tool::Verb::Cut, [](float seconds) {
+    return Vec3f{0.5f * seconds - 0.12f, 0, 0};
+  });
+}
+
+TEST(SimulationLoop, a_tip_that_is_thrown_about_is_held_back_and_the_recording_knows) {
+  expect_held_back(tool::Verb::Push, [](float seconds) {
+    const float down = std::max(0.0f, 0.1f - 0.5f * seconds);
+    return Vec3f{0.05f * std::sin(20 * seconds), down, 0};
+  });
 }
 
 TEST(SimulationLoop, a_later_snapshot_restores_to_the_hashes_that_follow) {

@@ -270,7 +270,7 @@ void RandomSession::make_inputs() {
   decisions_.sweeps = 3 + random_.below(4);
   decisions_.far_interval = 1 + random_.below(3);
   decisions_.is_far_exact = random_.below(4) == 0;
-  decisions_.waiting_blades = decisions_.node_limit % 4 == 0 ? decisions_.node_limit / 4 % 16 : 0;
+  decisions_.waiting_tools = decisions_.node_limit % 4 == 0 ? decisions_.node_limit / 4 % 16 : 0;
 }
 
 void RandomSession::count_state() {

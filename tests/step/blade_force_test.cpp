@@ -43,7 +43,7 @@ class Scene {
   // Returns the most since the beginning, m/s.
   float most_speed_m_s() const { return most_speed_m_s_; }
   // Bits of tools whose blades are to wait from now on.
-  void wait(std::uint32_t waiting_blades) { decisions_.waiting_blades = waiting_blades; }
+  void wait(std::uint32_t waiting_tools) { decisions_.waiting_tools = waiting_tools; }
   Simulation& simulation() { return simulation_; }
 
   void expect_work() const {
@@ -176,7 +176,7 @@ TEST(BladeForce, OfABladeThatIsToWaitIsAStopThatLetsItBack) {
   EXPECT_LE(scene.most_step_n(), static_cast<double>(blades::kMostStep_n) + 1e-4);
 }
 
-// control::BladeWaits has a bound of 0.1 m/s for a surgeon's blade.
+// control::ToolWaits has a bound of 0.1 m/s for a surgeon's blade.
 TEST(BladeForce, TellsHowFastABladeGoesThroughWholeTissueHoweverTough) {
   for (const double energy_j_m2 : {30.0, 750.0}) {
     SCOPED_TRACE(energy_j_m2);
@@ -189,6 +189,15 @@ TEST(BladeForce, TellsHowFastABladeGoesThroughWholeTissueHoweverTough) {
       EXPECT_GT(scene.most_speed_m_s(), 0.7f * speed);
     }
   }
+}
+
+TEST(BladeForce, TellsHowFastABladeTurnsInWholeTissue) {
+  constexpr float kLength_m = 0.12f, kAngle = 1.4f, kSeconds = 1;
+  Scene scene(block(0.005), kLength_m, {turned({0, -0.03f, 0.0013f}, kAngle, kSeconds)});
+  scene.run(kSeconds);
+  const float end_m_s = kLength_m * kAngle / kSeconds;
+  EXPECT_GT(scene.most_speed_m_s(), 0.2f * end_m_s);
+  EXPECT_LT(scene.most_speed_m_s(), end_m_s);
 }
 
 TEST(BladeForce, DoesTheWorkOfAStrokeThroughTheLiver) {

@@ -40,9 +40,9 @@ FrameFigures distinct_figures() {
   auto& [stage_median_us, tick_median_us, tick_p99_us, slow_ticks, rate] = pace;
   for (auto& median : stage_median_us) set(median);
   set(tick_median_us, tick_p99_us, slow_ticks);
-  auto& [level, budget_us, predicted_us, lowered, raised, time_rate, waiting_blades] = rate;
+  auto& [level, budget_us, predicted_us, lowered, raised, time_rate, waiting_tools] = rate;
   level = RateLevel::Overloaded;
-  set(budget_us, predicted_us, lowered, raised, time_rate, waiting_blades);
+  set(budget_us, predicted_us, lowered, raised, time_rate, waiting_tools);
   return figures;
 }
 

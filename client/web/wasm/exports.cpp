@@ -216,8 +216,8 @@ TROCAR_EXPORT(blood) const void* trocar_blood() {
   return model().blood();
 }
 // Bits of tools, by their slots.
-TROCAR_EXPORT(waiting_blades) std::uint32_t trocar_waiting_blades() {
-  return model().waiting_blades();
+TROCAR_EXPORT(waiting_tools) std::uint32_t trocar_waiting_tools() {
+  return model().waiting_tools();
 }
 TROCAR_EXPORT(tools) std::size_t trocar_tools() {
   return model().tools().size();

@@ -41,7 +41,7 @@ void PageModel::restart() {
   error_.clear();
   tools_.clear();
   blood_.reset();
-  waiting_blades_ = 0;
+  waiting_tools_ = 0;
   held_.clear();
   lines_ = {};
   drawing_.clear();
@@ -145,7 +145,7 @@ void PageModel::update_figures() {
     lips_[i] = shape::lip_bytes(smooth_.lips()[i], covers_[i]);
   const auto* newest = replica_->newest();
   if (newest == nullptr || !newest->has_state) return;  // its figures come in a moment
-  waiting_blades_ = newest->figures.pace.rate.waiting_blades;
+  waiting_tools_ = newest->figures.pace.rate.waiting_tools;
   blood_.reset();
   if (!newest->figures.blood) return;
   const wire::BloodFigures& figures = *newest->figures.blood;

@@ -96,8 +96,8 @@ class PageModel {
   std::span<const std::array<std::int8_t, 4>> lips() const { return lips_; }
   // Returns what the newest frame says of blood; null: the session does not bleed.
   const PageBlood* blood() const { return blood_ ? &*blood_ : nullptr; }
-  // Returns wire::RateFigures::waiting_blades of the newest frame.
-  std::uint32_t waiting_blades() const { return waiting_blades_; }
+  // Returns wire::RateFigures::waiting_tools of the newest frame.
+  std::uint32_t waiting_tools() const { return waiting_tools_; }
   std::span<const PageTool> tools() const { return tools_; }
   std::span<const PagePointer> pointers() const { return pointers_; }
 
@@ -144,7 +144,7 @@ class PageModel {
   std::vector<float> covers_;  // by blood, 0 to 1
   std::vector<std::array<std::int8_t, 4>> lips_;
   std::optional<PageBlood> blood_;
-  std::uint32_t waiting_blades_ = 0;
+  std::uint32_t waiting_tools_ = 0;
   std::vector<PageTool> tools_;
   std::vector<PagePointer> pointers_;
   replica::DrawnLines lines_;

@@ -400,12 +400,12 @@ void Server::tell_who_waits() {
     told_waiting_ = 0;
     next_told_ = frame.tick + kWarningPeriod;
   }
-  const auto waiting = frame.figures.pace.rate.waiting_blades & ~told_waiting_;
+  const auto waiting = frame.figures.pace.rate.waiting_tools & ~told_waiting_;
   told_waiting_ |= waiting;
   for (const auto& who : replicator_->roster().list())
     for (int i = 0; i < kToolsPerHand && who.slot.has_tools(); ++i)
       if ((waiting >> tool_slot(who.slot, i).value & 1) != 0)
-        log::info("{} is kept waiting: tool {} cuts faster than time can stay real", who.name,
+        log::info("{} is held back: tool {} moves faster than time can stay real", who.name,
                   i + 1);
 }
 

@@ -68,7 +68,7 @@ void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
     if (has_contact) sweeps[layer] += sweeps_now[layer];
   }
   contact_ticks += has_contact;
-  for (std::size_t i = 0; i < kMaxTools; ++i) waits[i] += decisions.waiting_blades >> i & 1;
+  for (std::size_t i = 0; i < kMaxTools; ++i) waits[i] += decisions.waiting_tools >> i & 1;
 }
 
 SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::SimulationInbox& inbox,
@@ -142,7 +142,7 @@ bool SimulationLoop::run_tick() {
   if (chooser_.is_in_use()) control::read_forces(simulation_, forces_n_);
   auto decisions =
       chooser_.choose(controller_ ? controller_->decisions() : options_.decisions, forces_n_);
-  decisions.waiting_blades = blade_waits_.waiting();
+  decisions.waiting_tools = tool_waits_.waiting();
   if (team_size_) simulation_.use_workers(team_size_->count());
   const auto begin = options_.clock_ns();
   const auto& report = simulation_.tick(inputs_, decisions);
@@ -150,7 +150,7 @@ bool SimulationLoop::run_tick() {
   const double load = static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds);
   if (controller_) {
     controller_->observe(report, {work_ns, lateness_ns_});
-    blade_waits_.observe(control::read_cutting_speeds(simulation_), load);
+    tool_waits_.observe(control::read_speeds_in_tissue(simulation_), load);
   }
   const auto level = controller_ ? controller_->figures().level : wire::RateLevel::Fixed;
   if (report.contact.nodes > 0)
@@ -201,7 +201,7 @@ void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
   pace.slow_ticks = slow_ticks_;
   if (controller_) pace.rate = controller_->figures();
   pace.rate.time_rate = time_rate_;
-  pace.rate.waiting_blades = blade_waits_.waited_lately();
+  pace.rate.waiting_tools = tool_waits_.waited_lately();
   report_.slow_ticks = slow_ticks_;
   report_.last_frame = frame;
   if (journal_) journal_->record_frame(report_.last_frame);

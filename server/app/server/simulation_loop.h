@@ -24,7 +24,7 @@
 #include "server/app/server/journal_sink.h"
 #include "server/app/server/pacer.h"
 #include "server/session/bleeding/bleeding.h"
-#include "server/session/control/blade_waits.h"
+#include "server/session/control/tool_waits.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
 #include "server/session/control/team_size.h"
@@ -52,7 +52,7 @@ struct RateReport {
   step::LayerCounts least_sweeps{};
   std::uint32_t least_node_limit = 0;
   std::uint64_t late_ticks = 0;         // began more than a tick after they were due
-  std::array<Tick, kMaxTools> waits{};  // ticks in which a tool's blade waited
+  std::array<Tick, kMaxTools> waits{};  // ticks in which a tool was held back
   std::uint64_t contact_workers = 0;    // sum over ticks in contact
 
   void add(const step::TickDecisions& decisions, bool has_contact, wire::RateLevel level);
@@ -124,7 +124,7 @@ class SimulationLoop {
   // Simulation thread.
   std::optional<control::RateController> controller_;
   control::DepthChooser chooser_;    // of a calibrated organ, unless decisions are fixed
-  control::BladeWaits blade_waits_;  // unless decisions are fixed
+  control::ToolWaits tool_waits_;  // unless decisions are fixed
   std::optional<control::TeamSize> team_size_;
   IdleProcessors idle_processors_;
   std::vector<double> forces_n_;         // of the tools that touched in the last tick

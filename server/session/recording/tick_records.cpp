@@ -42,7 +42,7 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     if (d.far_interval != 1) decisions.set_far_interval(d.far_interval);
     if (d.linger_ticks != step::TickDecisions{}.linger_ticks)
       decisions.set_linger_ticks(d.linger_ticks);
-    if (d.waiting_blades != 0) decisions.set_waiting_blades(d.waiting_blades);
+    if (d.waiting_tools != 0) decisions.set_waiting_tools(d.waiting_tools);
     if (d.layer_sweeps != step::TickDecisions{}.layer_sweeps)
       decisions.mutable_layer_sweeps()->Assign(d.layer_sweeps.begin(), d.layer_sweeps.end());
     const auto& p = d.policy;
@@ -108,7 +108,7 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
                         .far_interval = std::max(1u, d.far_interval()),
                         .linger_ticks = d.linger_ticks() > 0 ? d.linger_ticks()
                                                              : step::TickDecisions{}.linger_ticks,
-                        .waiting_blades = d.waiting_blades()};
+                        .waiting_tools = d.waiting_tools()};
     if (d.has_policy())
       record.decisions.policy = {.steps_per_tick = d.policy().steps_per_tick(),
                                  .residual_tolerance_n = d.policy().residual_tolerance_n(),

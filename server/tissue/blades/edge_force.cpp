@@ -19,7 +19,7 @@ constexpr float kHeading_m = 0.003f;
 constexpr float kSlow_m_s = 0.0005f, kFade = 0.01f, kLeastHeading = 1e-3f, kMostHeading = 1.001f;
 constexpr float kMostForce_n = 30;
 // These bound the state whatever the material, and what a snapshot may say.
-constexpr float kMostOwed_j = 10, kMostCut_n = 1e7f, kMostShare = 4;
+constexpr float kMostOwed_j = 10, kMostCut_n = 1e7f, kMostShare = 4, kMostSpeed_m_s = 10;
 // A row of elements opens when the cut, which goes 0.3 of them ahead of the edge, has passed it
 // whole. So in the mean the wound is this many elements ahead of the edge (e_0; 0 to -0.25 were
 // measured), give or take a half. The force changes by kGain (k) for each element of way owed.
@@ -122,6 +122,8 @@ Wrench EdgeForce::move(const EdgeEnds& ends, float opened_j, float h_m) {
     felt.force_n += force;
     felt.torque_nm += cross(at(ends, i) - ends[0], force);
   }
+  speed_m_s_ =
+      sums.cut_n > 0 ? std::min(sums.swept_j / sums.cut_n / kTickSeconds, kMostSpeed_m_s) : 0;
   follow_work(sums, opened_j, length(moved[0]), h_m);
   return felt;
 }
@@ -172,6 +174,7 @@ void EdgeForce::visit_state(world::StateArchive& archive) {
   };
   for (auto& end : ends_) vector(end);
   vector(velocity_);
+  number(speed_m_s_, 0, kMostSpeed_m_s);
   for (auto& part : parts_) {
     for (auto* const cut_n : {&part.cut_n, &part.next_cut_n}) number(*cut_n, 0, kMostCut_n);
     for (auto* const grip_n : {&part.grip_n, &part.next_grip_n}) number(*grip_n, 0, kMostForce_n);

@@ -11,12 +11,6 @@ constexpr float kSlack_m = 0.005f;
 constexpr std::size_t kMaxPathSteps = 64;
 constexpr std::uint32_t kNotNear = 0xffffffffu;
 
-// Returns the pose at part t of the way from a to b.
-Pose between(const Pose& a, const Pose& b, float t) {
-  if (t >= 1) return b;
-  return {a.position + (b.position - a.position) * t, interpolate(a.orientation, b.orientation, t)};
-}
-
 float distance_to(const ToolSolid& solid, const Vec3f& p) {
   return length(p - solid.nearest_on_core(p));
 }
@@ -335,9 +329,11 @@ void ContactFinder::plan_way(const ContactScene& scene, ToolContact& contact) {
   contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape);
   contact.start = has_appeared ? tool.pose : proxy.pose;
   const float way = way_between(contact.start, tool.pose, tool.shape);
-  const float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
+  float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
+  const bool is_held_back = (scene.held_back >> contact.tool.value & 1) != 0;
+  if (is_held_back && proxy.presses()) most = std::min(most, kHeldBack_m);
   const float part = way > most ? most / way : 1.0f;
-  contact.goal = between(contact.start, tool.pose, part);
+  contact.goal = part_of_way(contact.start, tool.pose, part);
   lay_path(tool.shape, contact, way * part);
 }
 
@@ -350,7 +346,7 @@ void ContactFinder::lay_path(const trocar::tool::ToolShape& shape, const ToolCon
   path_.clear();
   for (std::size_t i = 0; i <= steps; ++i)
     path_.emplace_back(
-        between(contact.start, contact.goal, static_cast<float>(i) / static_cast<float>(steps)),
+        part_of_way(contact.start, contact.goal, static_cast<float>(i) / static_cast<float>(steps)),
         shape);
 }
 
@@ -403,7 +399,7 @@ void ContactFinder::stop_at_meeting(const Nearby& nearby, ToolContact& contact) 
   }
   if (most == path_.size()) return;
   const float part = static_cast<float>(most) / static_cast<float>(path_.size() - 1);
-  contact.goal = between(contact.start, contact.goal, part);
+  contact.goal = part_of_way(contact.start, contact.goal, part);
   path_.resize(most + 1, path_.front());
 }
 
@@ -443,7 +439,7 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
   const Grasp& grasp = scene.grasps[slot];
   const auto& world = scene.world;
   ToolContact& contact = out.tools.back();
-  contact.goal = scene.grasps.pose(slot, scene.tools[slot]);
+  contact.goal = grasp.jaws;
   float area = 0;
   for (const auto node : grasp.nodes) area += world.surface_areas[node.value];
   for (std::size_t i = 0; i < grasp.nodes.size(); ++i) {

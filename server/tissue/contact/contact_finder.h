@@ -63,6 +63,7 @@ struct ContactScene {
   // Per tick, of any point of a tool's core: how far a proxy walks, and beyond what a hand has
   // appeared.
   float max_step_m = kMaxStep_m, jump_m = kJump_m;
+  std::uint32_t held_back = 0;  // bits of tools
 };
 
 struct NearTriangle {

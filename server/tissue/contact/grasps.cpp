@@ -1,16 +1,40 @@
 #include "server/tissue/contact/grasps.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/tissue/contact/contact_law.h"
 
 namespace trocar::contact {
+namespace {
 
-void GraspTable::anchor(ToolSlot slot, const Pose& pose) {
+// Returns how far jaws of this reach go from one pose to another, at most.
+float jaws_way(const Pose& a, const Pose& b, float reach_m) {
+  const auto &p = a.orientation, &q = b.orientation;
+  const float cosine = std::min(1.0f, std::abs(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w));
+  return length(b.position - a.position) + 2 * reach_m * std::sqrt(2 - 2 * cosine);
+}
+
+}  // namespace
+
+void GraspTable::anchor(ToolSlot slot) {
   Grasp& grasp = grasps_[slot.value];
-  if (grasp.nodes.empty() || grasp.is_anchored) return;
-  grasp.is_anchored = true;
-  grasp.anchor = pose;
+  if (!grasp.nodes.empty()) grasp.is_anchored = true;
+}
+
+void GraspTable::follow(const hands::ToolTable& tools, std::uint32_t held_back) {
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    Grasp& grasp = grasps_[i];
+    if (grasp.nodes.empty()) continue;
+    const Pose& hand = tools[ToolSlot{i}].pose;
+    const bool is_held_back = (held_back >> i & 1) != 0;
+    const float way = grasp.is_anchored ? 0 : jaws_way(grasp.jaws, hand, grasp.reach_m);
+    const float most = is_held_back ? kHeldBack_m : grasp.is_behind ? kCatchUp_m : INFINITY;
+    grasp.is_behind = way > most;
+    grasp.way_m = std::min(way, most);
+    if (!grasp.is_anchored)
+      grasp.jaws = grasp.is_behind ? part_of_way(grasp.jaws, hand, most / way) : hand;
+  }
 }
 
 void GraspTable::update_holds(const world::World& world, const hands::ToolTable& tools,
@@ -24,11 +48,11 @@ void GraspTable::update_holds(const world::World& world, const hands::ToolTable&
     if (!grips) {
       grasp.nodes.clear();
       grasp.offsets.clear();
-      grasp.grip_n = grasp.reach_m = grasp.closed = 0;
-      grasp.is_anchored = false;
-      grasp.anchor = {};
+      grasp.grip_n = grasp.reach_m = grasp.closed = grasp.way_m = 0;
+      grasp.is_anchored = grasp.is_behind = false;
+      grasp.jaws = {};
     } else if (claim.phase == hands::ClaimPhase::Ramping) {
-      anchor(slot, tools[slot].pose);
+      anchor(slot);
     } else {
       grasp.closed = std::min(1.0f, grasp.closed + 1 / kClosingTicks);
     }
@@ -41,9 +65,10 @@ void GraspTable::update_holds(const world::World& world, const hands::ToolTable&
     if (!is_new) continue;
     grasp.grip_n = tools[request.tool].shape.grip_n;
     grasp.reach_m = tools[request.tool].shape.reach_m;
+    grasp.jaws = tools[request.tool].pose;
     for (const auto node : request.core) {
       grasp.nodes.push_back(node);
-      grasp.offsets.push_back(tools[request.tool].pose.apply_inverse(world.position(node)));
+      grasp.offsets.push_back(grasp.jaws.apply_inverse(world.position(node)));
     }
   }
 }
@@ -109,7 +134,9 @@ void GraspTable::visit_state(world::StateArchive& archive, std::size_t node_coun
     archive.value(grasp.reach_m);
     archive.value(grasp.closed);
     archive.flag(grasp.is_anchored);
-    archive.value(grasp.anchor);
+    archive.flag(grasp.is_behind);
+    archive.value(grasp.jaws);
+    archive.value(grasp.way_m);
     if (!archive.is_reading()) continue;
     if (grasp.nodes.size() != grasp.offsets.size()) archive.fail();
     for (const auto node : grasp.nodes)

@@ -6,7 +6,7 @@
 // that has lost all of its nodes has slipped off. Jaws close in kClosingTicks, along the tool's x:
 // what lies between them is squeezed, and the grip grows with it. While a claim fades out (its
 // holder left, fell silent or was taken over) the grasp stays where it last was, whatever becomes
-// of the tool's slot.
+// of the tool's slot. Jaws that are held back follow their hand slowly, and catch up after that.
 
 #include <array>
 #include <span>
@@ -23,6 +23,8 @@ namespace trocar::contact {
 inline constexpr float kClosingTicks = 100;
 // How much thinner tissue is between closed jaws.
 inline constexpr float kSqueeze = 0.4f;
+// Jaws that were held back come after their hand at 0.5 m/s.
+inline constexpr float kCatchUp_m = 0.0005f;
 
 struct Grasp {
   std::vector<NodeIndex> nodes;  // ascending; empty: nothing held
@@ -30,8 +32,10 @@ struct Grasp {
   float grip_n = 0;              // of all nodes together
   float reach_m = 0;             // how far the jaws hold
   float closed = 0;              // 0: jaws open, 1: closed
-  bool is_anchored = false;      // fading out: `anchor` replaces the tool's pose
-  Pose anchor;                   // world_from_tool
+  bool is_anchored = false;      // fading out: the jaws stay where they are
+  bool is_behind = false;        // the jaws are not yet where their hand is
+  Pose jaws;                     // world_from_tool
+  float way_m = 0;               // that they went in the last tick
 };
 
 // Returns where the jaws hold a node, in the tool's frame.
@@ -43,19 +47,16 @@ inline Vec3f held_offset(const Grasp& grasp, std::size_t i) {
 class GraspTable {
  public:
   const Grasp& operator[](ToolSlot slot) const { return grasps_[slot.value]; }
-  // Returns where the grasp's frame is this tick.
-  Pose pose(ToolSlot slot, const hands::Tool& tool) const {
-    return grasps_[slot.value].is_anchored ? grasps_[slot.value].anchor : tool.pose;
-  }
-
   // O(tools x log(nodes held)).
   bool holds(NodeIndex node) const;
 
   // Two tools have changed hands.
   void hand_over(ToolSlot from, ToolSlot to) { std::swap(grasps_[from.value], grasps_[to.value]); }
 
-  // Before inputs change a tool: keeps the last pose of grasps that are going to fade.
-  void anchor(ToolSlot slot, const Pose& pose);
+  // Before inputs change a tool: its grasp is going to fade.
+  void anchor(ToolSlot slot);
+  // After that: jaws go where their hands are. held_back: bits of tools.
+  void follow(const hands::ToolTable& tools, std::uint32_t held_back);
   // After the claims were decided: takes hold of what was granted, lets go of what ended.
   void update_holds(const world::World& world, const hands::ToolTable& tools,
                     const hands::ClaimTable& claims, std::span<const hands::ClaimRequest> requests);

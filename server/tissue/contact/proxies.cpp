@@ -123,7 +123,7 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
   proxy.pose.position += out.moved;
   const float walked = std::max(0.0f, way_between(tool.start, hand.pose, hand.shape) -
                                           way_between(proxy.pose, hand.pose, hand.shape));
-  proxy.step_m = kFaster * walked + (proxy.point_ids.empty() ? kFree_m : kDeeper * tool.softness_m);
+  proxy.step_m = kFaster * walked + (proxy.presses() ? kDeeper * tool.softness_m : kFree_m);
 }
 
 }  // namespace

@@ -26,6 +26,8 @@ struct Proxy {
   float step_m = 0;        // how far it may walk in the next
   std::vector<std::uint32_t> point_ids;  // quadrature points pressed, ascending
   std::vector<Vec3f> anchors;            // m, tool frame; per point
+
+  bool presses() const { return !point_ids.empty(); }
 };
 
 // The tissue acts on the tool with this force and torque, in the world frame.

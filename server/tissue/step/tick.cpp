@@ -14,12 +14,12 @@ std::uint32_t admit_inputs(const hands::TickInputs& inputs, Tick tick, hands::To
   for (const auto slot : inputs.leaves)
     for (int i = 0; slot.has_tools() && i < kToolsPerHand; ++i) {
       const auto tool = tool_slot(slot, i);
-      grasps.anchor(tool, tools[tool].pose);
+      grasps.anchor(tool);
       claims.leave(tool, tick);
     }
   for (const auto& change : inputs.changes) {
     if (!change.tool.is_valid()) continue;
-    grasps.anchor(change.tool, tools[change.tool].pose);
+    grasps.anchor(change.tool);
     claims.leave(change.tool, tick);
   }
   return tools.admit(inputs, tick);
@@ -45,18 +45,25 @@ bool may_rest(const TickDecisions& decisions, const ExternalLoads* loads) {
 }
 
 // Tissue that is touched wakes, and its pairs are there in the same tick.
-ContactReport find_contacts(State& state, bool has_self_contact, bool may_rest,
+ContactReport find_contacts(State& state, const TickDecisions& decisions, bool may_rest,
                             ContactWork& contact, SolveWork& solve) {
   if (!may_rest) {
     solve.pieces.wake(state.world);
     hand_out_pieces(state.world, solve);
   }
   auto& found = contact.found;
-  contact.finder.find(
-      {state.world, state.tools, state.claims, state.grasps, state.proxies, state.world.tick},
-      found);
+  state.grasps.follow(state.tools, decisions.waiting_tools);
+  contact.finder.find({.world = state.world,
+                       .tools = state.tools,
+                       .claims = state.claims,
+                       .grasps = state.grasps,
+                       .proxies = state.proxies,
+                       .tick = state.world.tick,
+                       .held_back = decisions.waiting_tools},
+                      found);
   const auto find_self = [&] {
-    if (has_self_contact) contact.self_finder.find(state.world, state.self_contacts, found);
+    if (decisions.policy.has_self_contact)
+      contact.self_finder.find(state.world, state.self_contacts, found);
   };
   find_self();
   if (solve.pieces.wake_touched(found, state.world)) {
@@ -266,13 +273,13 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
 }
 
 // An edit of the topology goes to all of the state, and to the work that follows from it.
-blades::CutReport cut_tissue(std::uint32_t waiting_blades, State& state, CutWork& cut,
+blades::CutReport cut_tissue(std::uint32_t waiting_tools, State& state, CutWork& cut,
                              ContactWork& contact, NearWork& near, SolveWork& solve) {
   auto& cuts = state.cuts;
   find_tears(near.active.nodes(), state.grasps, solve.pieces.list(), state.world, cuts, cut);
   blades::CutReport report;
   const auto edit =
-      cuts.cut({state.tools, state.claims, waiting_blades}, state.world, cut.travel_m, report);
+      cuts.cut({state.tools, state.claims, waiting_tools}, state.world, cut.travel_m, report);
   if (edit) {
     hand_out(*edit, state, contact, near, solve);
     cuts.end_edit();
@@ -375,8 +382,7 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
       admit_inputs(inputs, world.tick, state.tools, state.claims, state.grasps) +
       (is_refused ? 1 : 0);
   end(Stage::Admit);
-  report.contact = find_contacts(state, decisions.policy.has_self_contact, has_rest,
-                                 context.contact, context.solve);
+  report.contact = find_contacts(state, decisions, has_rest, context.contact, context.solve);
   end(Stage::Contacts);
   report.near = fill_queue(contacts, loads, decisions, world, context.near);
   end(Stage::Queue);
@@ -384,7 +390,7 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   end(Stage::Solve);
   state.proxies.update(contacts, world, state.tools);
   end(Stage::Contacts);
-  report.cut = cut_tissue(decisions.waiting_blades, state, context.cut, context.contact,
+  report.cut = cut_tissue(decisions.waiting_tools, state, context.cut, context.contact,
                           context.near, context.solve);
   end(Stage::Cut);
   contact::update_claims(world, state.tools, contacts, context.contact.requests, state.claims,

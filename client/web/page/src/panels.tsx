@@ -19,7 +19,7 @@ export function People(props: { people: Participant[]; tools: Tool[]; own: numbe
       <ul class="people">
         {props.people.map(p => {
           const tools = props.tools.filter(t => t.slot >> 1 === p.slot), newton = tools.reduce((sum, t) => sum + forceOf(t), 0);
-          const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : p.frozenBy !== '' ? `held still by ${p.frozenBy}` : p.lentTools !== 0 ? 'was handed an instrument' : has && props.waits?.(p.slot) ? 'is kept waiting: cuts too fast' : has ? doing(tools, p.tool) : 'watches';
+          const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : p.frozenBy !== '' ? `held still by ${p.frozenBy}` : p.lentTools !== 0 ? 'was handed an instrument' : has && props.waits?.(p.slot) ? 'is held back: moves too fast' : has ? doing(tools, p.tool) : 'watches';
           return (
             <li key={p.slot} class={p.isAway ? 'away' : ''}>
               <span class={has ? 'dot' : 'dot none'} ref={el => el?.style.setProperty('--own', hex(props.colourOf(p.slot)))} aria-hidden="true" />

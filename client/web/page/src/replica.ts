@@ -51,7 +51,7 @@ interface Exports {
   fine_picture_at(): number;
   fine_picture_bytes(): number;
   blood(): number;
-  waiting_blades(): number;
+  waiting_tools(): number;
   tools(): number;
   tools_at(): number;
   pointers(): number;
@@ -235,8 +235,8 @@ export class Replica {
     return out;
   }
 
-  // Whether a blade of this participant is kept waiting, or was a moment ago.
-  waits(participant: number): boolean { return (this.e.waiting_blades() >>> (2 * participant) & 3) !== 0; }
+  // Whether a tool of this participant is held back, or was a moment ago.
+  waits(participant: number): boolean { return (this.e.waiting_tools() >>> (2 * participant) & 3) !== 0; }
 
   // Says how much has bled so far; null: the session does not bleed.
   blood(): Blood | null {

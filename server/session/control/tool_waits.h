@@ -1,12 +1,13 @@
 #pragma once
 
 // Whoever slows time gives way first, and nobody else feels it: while ticks take longer than there
-// is time for, blades that cut faster than a surgeon does wait where they are. Their hands are held
-// back (blades/blades.h), and everybody is told. What they have planned is cut meanwhile.
+// is time for, tools that go faster through tissue than a surgeon's wait. A blade stops where it
+// is: its hand is held back (blades/blades.h), and what it has planned is cut meanwhile. A tip that
+// presses, and jaws that hold, go on slowly (contact/contact_list.h). Everybody is told.
 //
 // Laws, once a tick, with the mean load of the last 64 ticks or so, in ticks of real time:
-//   wait   when it is above kHighLoad, each blade whose mean speed is above kOrdinary_m_s;
-//   go on  one blade each kReleaseEvery ticks, which began to wait first: after kWait ticks, or
+//   wait   when it is above kHighLoad, each tool whose mean speed is above kOrdinary_m_s;
+//   go on  one tool each kReleaseEvery ticks, which began to wait first: after kWait ticks, or
 //          kWaitAgain where it waited within the last kForget, if the load is below kLowLoad;
 //          after kMostWait whatever it is, so that nobody waits for the work of others.
 // Pure arithmetic on what it is given. What it decides is an input of the tick and journalled.
@@ -24,23 +25,23 @@ class Simulation;
 
 namespace trocar::control {
 
-class BladeWaits {
+class ToolWaits {
  public:
-  static constexpr float kOrdinary_m_s = 0.1f;  // through whole tissue: a surgeon's quick stroke
+  static constexpr float kOrdinary_m_s = 0.1f;  // in tissue: a surgeon's quick stroke
   static constexpr double kHighLoad = 0.9, kLowLoad = 0.5;
   static constexpr Tick kWait = 128, kWaitAgain = 256, kMostWait = 1000;
   static constexpr Tick kReleaseEvery = 32, kForget = 2000;
 
-  // After each tick. speeds_m_s: of each tool's blade through whole tissue; 0 for one that does not
-  // cut or waits. load: what the tick took, in ticks of real time.
+  // After each tick. speeds_m_s: of each tool in tissue; 0 where it is free or stopped. load: what
+  // the tick took, in ticks of real time.
   void observe(std::span<const float, kMaxTools> speeds_m_s, double load);
-  // Returns the bits of tools whose blades wait in the next tick.
+  // Returns the bits of tools that wait in the next tick.
   std::uint32_t waiting() const;
   // And of those that waited within a second: nobody can read a shorter word.
   std::uint32_t waited_lately() const;
 
  private:
-  struct Blade {
+  struct ToolWait {
     float speed_m_s = 0;  // mean
     Tick since = 0;       // it waits, or waited
     Tick wait = 0;        // for at least so long
@@ -48,16 +49,16 @@ class BladeWaits {
     bool waits = false;
   };
 
-  void begin(Blade& blade) const;
-  bool may_go_on(const Blade& blade) const;
+  void begin(ToolWait& tool) const;
+  bool may_go_on(const ToolWait& tool) const;
   void release_one();
 
-  std::array<Blade, kMaxTools> blades_;
+  std::array<ToolWait, kMaxTools> tools_;
   double load_ = 0;
   Tick now_ = 0, released_ = 0;
 };
 
-// Reads how fast each tool's blade went through whole tissue in the last tick, m/s.
-std::array<float, kMaxTools> read_cutting_speeds(const step::Simulation& simulation);
+// Reads how fast each tool cut through whole tissue, or went on pressing or holding, in the last tick, m/s.
+std::array<float, kMaxTools> read_speeds_in_tissue(const step::Simulation& simulation);
 
 }  // namespace trocar::control

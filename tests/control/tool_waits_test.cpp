@@ -1,4 +1,4 @@
-#include "server/session/control/blade_waits.h"
+#include "server/session/control/tool_waits.h"
 
 #include <gtest/gtest.h>
 
@@ -9,13 +9,13 @@
 namespace trocar::control {
 namespace {
 
-constexpr float kQuick = 2 * BladeWaits::kOrdinary_m_s, kSlow = 0.9f * BladeWaits::kOrdinary_m_s;
+constexpr float kQuick = 2 * ToolWaits::kOrdinary_m_s, kSlow = 0.9f * ToolWaits::kOrdinary_m_s;
 
-// Blades cut with these speeds while they may; ticks take `busy` while a quick one does, else
+// Tools go with these speeds while they may; ticks take `busy` while a quick one does, else
 // `idle`. Returns the bits that waited, tick for tick.
 std::vector<std::uint32_t> waits_of(std::vector<float> speeds, double busy, double idle,
                                     Tick ticks) {
-  BladeWaits waits;
+  ToolWaits waits;
   std::vector<std::uint32_t> rows;
   for (Tick tick = 0; tick < ticks; ++tick) {
     const auto waiting = waits.waiting();
@@ -25,7 +25,7 @@ std::vector<std::uint32_t> waits_of(std::vector<float> speeds, double busy, doub
     for (std::size_t i = 0; i < speeds.size(); ++i) {
       if ((waiting >> i & 1) != 0) continue;
       now[i] = speeds[i];
-      is_busy |= now[i] > BladeWaits::kOrdinary_m_s;
+      is_busy |= now[i] > ToolWaits::kOrdinary_m_s;
     }
     waits.observe(now, is_busy ? busy : idle);
   }
@@ -52,15 +52,15 @@ std::vector<int> lengths_of(const std::vector<std::uint32_t>& rows, std::size_t 
   return lengths;
 }
 
-TEST(BladeWaits, NoOrdinaryBladeWaitsHoweverLateTicksAre) {
+TEST(ToolWaits, NoOrdinaryToolWaitsHoweverLateTicksAre) {
   for (const auto row : waits_of({kSlow, kSlow, kSlow}, 9, 9, 5000)) ASSERT_EQ(row, 0u);
 }
 
-TEST(BladeWaits, NoBladeWaitsWhileThereIsTime) {
+TEST(ToolWaits, NoToolWaitsWhileThereIsTime) {
   for (const auto row : waits_of({9, 9, 9}, 0.85, 0.85, 5000)) ASSERT_EQ(row, 0u);
 }
 
-TEST(BladeWaits, WhoSlowsTimeWaitsAndNobodyElse) {
+TEST(ToolWaits, WhoSlowsTimeWaitsAndNobodyElse) {
   const auto rows = waits_of({kSlow, kQuick, kSlow}, 3, 0.3, 10'000);
   EXPECT_EQ(mean_of(rows, 0), 0);
   EXPECT_GT(mean_of(rows, 1), 0.5);
@@ -71,23 +71,23 @@ TEST(BladeWaits, WhoSlowsTimeWaitsAndNobodyElse) {
   EXPECT_EQ(rows[48], 2u);
   const auto lengths = lengths_of(rows, 1);
   ASSERT_GT(lengths.size(), 5u);
-  EXPECT_GE(lengths[0], static_cast<int>(BladeWaits::kWait));
-  EXPECT_LT(lengths[0], static_cast<int>(BladeWaits::kWaitAgain));
+  EXPECT_GE(lengths[0], static_cast<int>(ToolWaits::kWait));
+  EXPECT_LT(lengths[0], static_cast<int>(ToolWaits::kWaitAgain));
   for (std::size_t i = 1; i < lengths.size(); ++i)
-    EXPECT_GE(lengths[i], static_cast<int>(BladeWaits::kWaitAgain));
+    EXPECT_GE(lengths[i], static_cast<int>(ToolWaits::kWaitAgain));
 }
 
 // Others may need the time for long.
-TEST(BladeWaits, NobodyWaitsLongerThanASecondHoweverBusyOthersAre) {
+TEST(ToolWaits, NobodyWaitsLongerThanASecondHoweverBusyOthersAre) {
   for (const double idle : {0.7, 3.0}) {
     const auto lengths = lengths_of(waits_of({kQuick}, 3, idle, 10'000), 0);
     ASSERT_GT(lengths.size(), 5u);
     for (const int length : lengths)
-      EXPECT_EQ(length, static_cast<int>(BladeWaits::kMostWait)) << idle;
+      EXPECT_EQ(length, static_cast<int>(ToolWaits::kMostWait)) << idle;
   }
 }
 
-TEST(BladeWaits, EightThatSlowTimeGoOnOneByOne) {
+TEST(ToolWaits, EightThatSlowTimeGoOnOneByOne) {
   const auto rows = waits_of(std::vector<float>(8, kQuick), 3, 0.3, 10'000);
   for (std::size_t tick = 1; tick < rows.size(); ++tick) {
     const auto released = std::popcount(rows[tick - 1] & ~rows[tick]);
@@ -99,8 +99,8 @@ TEST(BladeWaits, EightThatSlowTimeGoOnOneByOne) {
   }
 }
 
-TEST(BladeWaits, AStallIsNoBladesFault) {
-  BladeWaits waits;
+TEST(ToolWaits, AStallIsNobodysFault) {
+  ToolWaits waits;
   std::array<float, kMaxTools> speeds{kQuick};
   for (Tick tick = 0; tick < 2000; ++tick) {
     waits.observe(speeds, tick == 1000 ? 5000 : 0.5);
@@ -108,8 +108,8 @@ TEST(BladeWaits, AStallIsNoBladesFault) {
   }
 }
 
-TEST(BladeWaits, AWaitIsToldForASecondMore) {
-  BladeWaits waits;
+TEST(ToolWaits, AWaitIsToldForASecondMore) {
+  ToolWaits waits;
   std::array<float, kMaxTools> speeds{kQuick};
   Tick began = 0, ended = 0, told = 0;
   for (Tick tick = 1; tick < 5000; ++tick) {
