@@ -52,6 +52,7 @@ std::optional<topology::Edit> TissueCuts::cut(const BladeTable::Hands& hands,
   const auto lifted = blades_.begin_tick(hands, !report.is_full);
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if ((lifted >> i & 1) != 0) cutter_->lift(i);
+    if (blades_[ToolSlot{i}].is_at_work) last_work_ = world.tick;
     if (!blades_[ToolSlot{i}].is_cutting) continue;
     const auto& moved = blades_[ToolSlot{i}].edge.tissue_m();
     cutter_->carry(i, {to_double(moved[0]), to_double(moved[1])});
@@ -72,6 +73,7 @@ std::optional<topology::Edit> TissueCuts::cut(const BladeTable::Hands& hands,
   if (output_.events.events.empty()) return std::nullopt;
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);
+  last_work_ = world.tick;
   return edit();
 }
 
@@ -194,6 +196,7 @@ void TissueCuts::forget_pending() {
 
 void TissueCuts::visit_state(world::StateArchive& archive, const HandOut& hand_out) {
   archive.value(history_hash_);
+  archive.value(last_work_);
   archive.value(published_);
   archive.value(layout_.epoch);
   archive.flag(is_new_to_clients_);

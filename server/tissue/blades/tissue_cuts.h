@@ -57,6 +57,8 @@ class TissueCuts {
   // Gives what has come to the surface its slots and numbers. The world has applied the edit.
   void extend_layout(const topology::Edit& edit, const world::World& world);
 
+  // Returns the last tick in which a blade was at work or something was cut or torn; 0: none was.
+  Tick last_work() const { return last_work_; }
   // All edits, oldest first.
   std::span<const cutting::CutEvents> history() const { return history_; }
 
@@ -93,6 +95,7 @@ class TissueCuts {
   std::uint32_t published_ = 0;  // edits of history_ that clients know
   bool is_new_to_clients_ = false;
   std::uint64_t history_hash_ = 0;
+  Tick last_work_ = 0;
   BladeTable blades_;
   wire::SurfaceChange pending_;
   std::uint32_t first_pending_ = 0;  // number of pending_.added[0]

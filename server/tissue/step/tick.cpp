@@ -124,12 +124,15 @@ LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::Prop
 }
 
 // Tets along wounds are small and stiff: what moves there without a tool comes to rest under more
-// sweeps than the uncut mesh needs.
-constexpr std::uint32_t kRestSweeps = 4;
+// sweeps than the uncut mesh needs. While people cut nothing has to rest, and time is short: fewer
+// only keep it from shaking more.
+constexpr std::uint32_t kRestSweeps = 4, kCutSweeps = 2;
+constexpr Tick kRestsAfter = 256;  // from the last work of a blade on
 
-void sweep_until_rest(dynamics::SolveSettings& settings) {
-  settings.sweeps = std::max(settings.sweeps, kRestSweeps);
-  settings.far_sweeps = std::max(settings.far_sweeps, kRestSweeps);
+void sweep_until_rest(Tick since_work, dynamics::SolveSettings& settings) {
+  const auto least = since_work < kRestsAfter ? kCutSweeps : kRestSweeps;
+  settings.sweeps = std::max(settings.sweeps, least);
+  settings.far_sweeps = std::max(settings.far_sweeps, least);
   settings.bands = {};
 }
 
@@ -187,15 +190,18 @@ SolveReport solve_steps(const contact::ContactList& contacts, std::span<const No
 }
 
 // Active nodes that have come to rest are let go.
-SolveReport solve(const contact::ContactList& contacts, const propagation::PropagationQueue& queue,
-                  const TickDecisions& decisions, bool may_rest, ExternalLoads* loads,
-                  world::World& world, propagation::ActiveSet& active, SolveWork& work) {
+SolveReport solve(const contact::ContactList& contacts, bool may_rest,
+                  const TickDecisions& decisions, ExternalLoads* loads, State& state,
+                  NearWork& near, SolveWork& work) {
+  auto& world = state.world;
+  auto& active = near.active;
+  const auto& queue = near.queue;
   const auto nodes = active.nodes();
   const auto layer_nodes = find_bands(nodes, queue, decisions, work.bands);
   auto settings = settings_of(decisions, work);
   const bool has_untouched_wounds = contacts.tools.empty() && !world.origins.empty();
   if (may_rest && has_untouched_wounds && !(settings.residual_tolerance_n > 0))
-    sweep_until_rest(settings);
+    sweep_until_rest(world.tick - state.cuts.last_work(), settings);
   auto report = solve_steps(contacts, nodes, settings, decisions.policy.steps_per_tick, loads,
                             world, work.solver);
   const auto settled =
@@ -259,9 +265,7 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
   if (may_rest) pieces.begin_step(state.world);
   work.solver.use_energies(may_rest ? pieces.turning() : std::span<const NodeIndex>{});
   work.solver.let_spring(may_rest ? pieces.free() : std::span<const NodeIndex>{});
-  if (!is_asleep)
-    report = solve(contacts, context.near.queue, decisions, may_rest, loads, state.world,
-                   context.near.active, work);
+  if (!is_asleep) report = solve(contacts, may_rest, decisions, loads, state, context.near, work);
   pieces::Pieces::Motion motion;
   if (may_rest) {
     motion = pieces.end_step(contacts, state.world);
