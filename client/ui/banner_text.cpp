@@ -18,7 +18,8 @@ std::string waiting_text(const HudModel& model) {
   std::string names;
   for (const auto& who : model.participants) {
     if (!who.waits) continue;
-    if (who.is_self) return "Your instrument is held back: it moves faster than the server can follow.";
+    if (who.is_self)
+      return "Your instrument is held back: it moves faster than the server can follow.";
     names += (names.empty() ? "" : ", ") + who.name;
   }
   return names.empty() ? "" : "Held back, for moving faster than the server can follow: " + names;

@@ -34,7 +34,7 @@ class SessionClock {
     for (const auto ns : report.stage_cpu_ns) work_ns += ns;
     now_ns_ += work_ns;
     controller_.observe(report, {work_ns, lateness_ns});
-    waits_.observe(control::read_speeds_in_tissue(simulation),
+    waits_.observe(speeds_.read(simulation),
                    static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds));
   }
 
@@ -42,6 +42,7 @@ class SessionClock {
   app::Pacer pacer_{0};
   std::uint64_t now_ns_ = 0;
   control::RateController controller_;
+  control::TissueSpeeds speeds_;
   control::ToolWaits waits_;
 };
 

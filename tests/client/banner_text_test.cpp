@@ -84,7 +84,8 @@ TEST(BannerText, WhoIsKeptWaitingIsToldSoAndSoAreTheOthers) {
   model.participants[1].is_self = true;
   banners = banners_of(model);
   ASSERT_EQ(banners.size(), 1u);
-  EXPECT_EQ(banners[0].text, "Your instrument is held back: it moves faster than the server can follow.");
+  EXPECT_EQ(banners[0].text,
+            "Your instrument is held back: it moves faster than the server can follow.");
   EXPECT_EQ(banners[0].advice, "Draw back a little, and go on more slowly.");
 }
 

@@ -50,6 +50,7 @@ class HandScene {
   void put(std::uint8_t hand, const Pose& pose, tool::Verb verb = tool::Verb::Push) {
     inputs_.samples.push_back({tool_slot({hand}, 0), {pose, verb}});
   }
+  void leave(std::uint8_t hand) { inputs_.leaves.push_back({hand}); }
   const step::TickReport& tick() {
     const auto& report = simulation.tick(inputs_, decisions);
     inputs_.clear();

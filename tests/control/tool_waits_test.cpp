@@ -2,9 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <utility>
 #include <vector>
+
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::control {
 namespace {
@@ -120,6 +125,42 @@ TEST(ToolWaits, AWaitIsToldForASecondMore) {
   }
   EXPECT_GT(ended, began);
   EXPECT_EQ(told, ended + kTicksPerSecond - 1);
+}
+
+// Jaws swing the top of the organ to and fro; a finger rests beside them.
+TEST(TissueSpeeds, WhoIsCarriedAlongByOthersIsNotFast) {
+  const auto organ = *catalogue::make_liver(1500);
+  const auto top = to_float(*std::ranges::max_element(organ.mesh.rest_positions, {}, &Vec3d::y));
+  step::Simulation simulation(organ);
+  TissueSpeeds speeds;
+  const ToolSlot jaws = tool_slot({0}, 0), finger = tool_slot({1}, 0);
+  hands::TickInputs inputs;
+  for (std::uint8_t i = 0; i < 2; ++i) {
+    hands::HandJoin join{.slot = {i}};
+    join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.3f, .reach_m = 0.02f, .grip_n = 100};
+    inputs.joins.push_back(join);
+  }
+  float swings_m_s = 0, rests_m_s = 0;
+  int pressed = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    const float t = static_cast<float>(tick) * kTickSeconds;
+    const Vec3f swing{0.02f * std::sin(20 * std::max(0.0f, t - 0.2f)), 0, 0};
+    const auto put = [&](ToolSlot tool, const Vec3f& tip, tool::Verb verb) {
+      inputs.samples.push_back({tool, {{tip, rotation_from_z({0, 1, 0})}, verb}});
+    };
+    put(jaws, top + swing, tool::Verb::Grasp);
+    put(finger, top + Vec3f{0.03f, std::max(-0.012f, 0.02f - 0.2f * t), 0}, tool::Verb::Push);
+    simulation.tick(inputs, {});
+    inputs.clear();
+    const auto now = speeds.read(simulation);
+    if (tick < 250) continue;
+    pressed += simulation.state().proxies[finger].presses();
+    swings_m_s = std::max(swings_m_s, now[jaws.value]);
+    rests_m_s = std::max(rests_m_s, now[finger.value]);
+  }
+  EXPECT_GT(pressed, 50);
+  EXPECT_GT(swings_m_s, ToolWaits::kOrdinary_m_s);
+  EXPECT_LT(rests_m_s, 1e-3f);
 }
 
 }  // namespace

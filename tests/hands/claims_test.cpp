@@ -295,7 +295,7 @@ TEST_F(Claims, ABladeThatHoldsGoesBeforeWhoWaits) {
   EXPECT_FALSE(holds(4)) << "two blades pass the node to and fro";
 }
 
-TEST_F(Claims, AStoppedToolWaitsATickForOneThatMovesAway) {
+TEST_F(Claims, AStoppedBladeWaitsATickForOneThatMovesAway) {
   set(0, Verb::Cut, {1});
   set(2, Verb::Cut, {2});
   advance();

@@ -277,7 +277,8 @@ void expect_held_back(tool::Verb verb, const std::function<Vec3f(float seconds)>
   options.clock_ns = [&now_ns] { return now_ns += kTickNanoseconds; };
   app::SimulationLoop loop(simulation, inbox, handover, &sink, options, [] {});
   hands::HandJoin join{.slot = {1}};
-  join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.1f};
+  join.shapes[0] = {
+      .radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.02f, .grip_n = 100, .edge_m = 0.1f};
   ASSERT_TRUE(inbox.try_push_join(join));
   for (int tick = 0; tick < 480; ++tick) {
     const Vec3f tip = place(static_cast<float>(tick) * kTickSeconds);
@@ -313,6 +314,14 @@ TEST(SimulationLoop, a_tip_that_is_thrown_about_is_held_back_and_the_recording_k
   expect_held_back(tool::Verb::Push, [](float seconds) {
     const float down = std::max(0.0f, 0.1f - 0.5f * seconds);
     return Vec3f{0.05f * std::sin(20 * seconds), down, 0};
+  });
+}
+
+TEST(SimulationLoop, jaws_that_swing_tissue_are_held_back_and_the_recording_knows) {
+  const auto organ = *catalogue::make_liver(1500);
+  const auto top = *std::ranges::max_element(organ.mesh.rest_positions, {}, &Vec3d::y);
+  expect_held_back(tool::Verb::Grasp, [at = to_float(top)](float seconds) {
+    return at + Vec3f{0.02f * std::sin(20 * std::max(0.0f, seconds - 0.1f)), 0, 0};
   });
 }
 

@@ -47,6 +47,43 @@ TEST(ScenarioRun, EachLawStretchesLikeABar) {
   }
 }
 
+TEST(ScenarioRun, AGraspLiftsInAStaticRun) {
+  const auto run = make(R"([organ]
+source = "block"
+nodes = [3, 9, 3]
+spacing_mm = 5
+[material]
+young_modulus_pa = 4000
+[[tool]]
+reach_mm = 8
+grip_n = 50
+anchor = [0, 1, 0]
+[[tool.key]]
+time_s = 0
+position_mm = [0, 0, 0]
+shaft = [0, 1, 0]
+verb = "grasp"
+[[tool.key]]
+time_s = 0.5
+position_mm = [0, 0, 0]
+[[tool.key]]
+time_s = 1
+position_mm = [0, 2, 0]
+[run]
+mode = "static"
+seconds = 1
+load_steps = 4
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)");
+  ASSERT_TRUE(run);
+  for (int i = 0; i < 4; ++i) run->step();
+  // Stress of a bar of 4 cm that is 2 mm longer, over a cross-section of 1 cm2.
+  constexpr double kExpected = -0.002 / 0.04 * 4000 * 1e-4;
+  EXPECT_NEAR(run->probe(0).y, kExpected, 0.3 * std::abs(kExpected));
+}
+
 TEST(ScenarioRun, AStiffRegionStretchesLess) {
   const auto run = make(pulled_block("", "mode = \"static\"\n") + R"([[nodes]]
 name = "half"

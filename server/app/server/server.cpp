@@ -140,7 +140,7 @@ class Server {
   bool is_awaiting_ = false;  // time begins when enough people are there
   bool is_ending_ = false, is_paused_ = false;
   Tick next_warning_ = 0;
-  // Bits of tools of whose blades the log has said that they wait, and when it may say so again.
+  // Bits of tools of which the log has said that they are held back, and when it may say so again.
   std::uint32_t told_waiting_ = 0;
   Tick next_told_ = 0;
   double wall_seconds_ = 0;
@@ -405,8 +405,7 @@ void Server::tell_who_waits() {
   for (const auto& who : replicator_->roster().list())
     for (int i = 0; i < kToolsPerHand && who.slot.has_tools(); ++i)
       if ((waiting >> tool_slot(who.slot, i).value & 1) != 0)
-        log::info("{} is held back: tool {} moves faster than time can stay real", who.name,
-                  i + 1);
+        log::info("{} is held back: tool {} moves faster than time can stay real", who.name, i + 1);
 }
 
 Status Server::open_figures() {

@@ -150,7 +150,7 @@ bool SimulationLoop::run_tick() {
   const double load = static_cast<double>(work_ns) / static_cast<double>(kTickNanoseconds);
   if (controller_) {
     controller_->observe(report, {work_ns, lateness_ns_});
-    tool_waits_.observe(control::read_speeds_in_tissue(simulation_), load);
+    tool_waits_.observe(tissue_speeds_.read(simulation_), load);
   }
   const auto level = controller_ ? controller_->figures().level : wire::RateLevel::Fixed;
   if (report.contact.nodes > 0)

@@ -24,10 +24,10 @@
 #include "server/app/server/journal_sink.h"
 #include "server/app/server/pacer.h"
 #include "server/session/bleeding/bleeding.h"
-#include "server/session/control/tool_waits.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
 #include "server/session/control/team_size.h"
+#include "server/session/control/tool_waits.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/replication/duration_histogram.h"
 #include "server/tissue/step/simulation.h"
@@ -123,7 +123,8 @@ class SimulationLoop {
 
   // Simulation thread.
   std::optional<control::RateController> controller_;
-  control::DepthChooser chooser_;    // of a calibrated organ, unless decisions are fixed
+  control::DepthChooser chooser_;  // of a calibrated organ, unless decisions are fixed
+  control::TissueSpeeds tissue_speeds_;
   control::ToolWaits tool_waits_;  // unless decisions are fixed
   std::optional<control::TeamSize> team_size_;
   IdleProcessors idle_processors_;

@@ -112,7 +112,7 @@ Json rate_figures(const Summary& s) {
   return {
       {"ticks", ticks},
       {"late_ticks", rate.late_ticks},
-      {"blade_wait_ticks", waits},
+      {"held_back_ticks", waits},
       {"lowered", last.lowered},
       {"raised", last.raised},
       {"budget_us", last.budget_us},

@@ -373,9 +373,16 @@ StepReport ScenarioRun::step_static() {
        ++round) {
     sample_tools(++world.tick, now, round == 0);
     step::admit_inputs(inputs_, world.tick, state.tools, state.claims, state.grasps);
+    state.grasps.follow(state.tools, 0);
     // Without time a tool has no speed either.
-    context.contact.finder.find({world, state.tools, state.claims, state.grasps, state.proxies,
-                                 world.tick, kNoLimit_m, kNoLimit_m},
+    context.contact.finder.find({.world = world,
+                                 .tools = state.tools,
+                                 .claims = state.claims,
+                                 .grasps = state.grasps,
+                                 .proxies = state.proxies,
+                                 .tick = world.tick,
+                                 .max_step_m = kNoLimit_m,
+                                 .jump_m = kNoLimit_m},
                                 context.contact.found);
     before_.assign(world.displacements.begin(), world.displacements.end());
     report = relax(loads);

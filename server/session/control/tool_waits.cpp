@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "server/tissue/contact/tool_solid.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::control {
@@ -10,6 +9,7 @@ namespace {
 
 constexpr float kSpeedGain = 1.0f / 32;
 constexpr double kMeanLoadGain = 1.0 / 64;
+constexpr float kMostSpeed_m_s = 1;           // A hand that appears elsewhere counts for little.
 constexpr double kMostLoad = kTicksPerFrame;  // A stall says nothing about tools, however long.
 
 }  // namespace
@@ -57,21 +57,20 @@ std::uint32_t ToolWaits::waited_lately() const {
   return bits;
 }
 
-std::array<float, kMaxTools> read_speeds_in_tissue(const step::Simulation& simulation) {
+std::array<float, kMaxTools> TissueSpeeds::read(const step::Simulation& simulation) {
   const auto& state = simulation.state();
   std::array<float, kMaxTools> speeds_m_s{};
-  for (std::uint8_t i = 0; i < kMaxTools; ++i)
-    speeds_m_s[i] = state.cuts.cutting_speed_m_s(ToolSlot{i});
+  std::array<bool, kMaxTools> touches{};
   for (const auto& contact : simulation.context().contact.found.tools) {
-    if (contact.verb == tool::Verb::Grasp) {
-      speeds_m_s[contact.tool.value] = state.grasps[contact.tool].way_m / kTickSeconds;
-      continue;
-    }
-    const auto& proxy = state.proxies[contact.tool];
-    if (!proxy.presses()) continue;
-    const float way_m =
-        contact::way_between(contact.start, proxy.pose, state.tools[contact.tool].shape);
-    speeds_m_s[contact.tool.value] = way_m / kTickSeconds;
+    const bool holds = contact.verb == tool::Verb::Grasp && !state.grasps[contact.tool].is_anchored;
+    touches[contact.tool.value] = holds || state.proxies[contact.tool].presses();
+  }
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const Vec3f tip = state.tools[ToolSlot{i}].pose.position;
+    const float hand_m_s = length(tip - tips_[i]) / kTickSeconds;
+    tips_[i] = tip;
+    const float speed = touches[i] ? hand_m_s : state.cuts.cutting_speed_m_s(ToolSlot{i});
+    speeds_m_s[i] = std::min(speed, kMostSpeed_m_s);
   }
   return speeds_m_s;
 }

@@ -10,6 +10,7 @@
 //   go on  one tool each kReleaseEvery ticks, which began to wait first: after kWait ticks, or
 //          kWaitAgain where it waited within the last kForget, if the load is below kLowLoad;
 //          after kMostWait whatever it is, so that nobody waits for the work of others.
+// A wait is its hand's, whatever instrument it is handed meanwhile.
 // Pure arithmetic on what it is given. What it decides is an input of the tick and journalled.
 
 #include <array>
@@ -18,6 +19,7 @@
 
 #include "common/base/ids.h"
 #include "common/base/tick.h"
+#include "common/math/vec3.h"
 
 namespace trocar::step {
 class Simulation;
@@ -58,7 +60,16 @@ class ToolWaits {
   Tick now_ = 0, released_ = 0;
 };
 
-// Reads how fast each tool cut through whole tissue, or went on pressing or holding, in the last tick, m/s.
-std::array<float, kMaxTools> read_speeds_in_tissue(const step::Simulation& simulation);
+// Reads how fast each tool went through tissue in the last tick, m/s: a blade through what is
+// whole, and the hand of a tip that presses or of jaws that hold. Who is carried along by others,
+// or catches up, is not fast.
+class TissueSpeeds {
+ public:
+  // After each tick.
+  std::array<float, kMaxTools> read(const step::Simulation& simulation);
+
+ private:
+  std::array<Vec3f, kMaxTools> tips_;  // of hands, in the tick before
+};
 
 }  // namespace trocar::control

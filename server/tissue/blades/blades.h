@@ -28,6 +28,8 @@ struct Blade {
   Vec3f stop, ahead;  // stopped: where the tip was, and towards what, of length 1 or 0
   Wrench felt;
 
+  // Closing scissors meet nothing; they cut.
+  bool is_in_tissue() const { return is_at_work && is_cutting && edge.meets_tissue(); }
   bool is_felt() const {
     return length_squared(felt.force_n) > 0 || length_squared(felt.torque_nm) > 0;
   }

@@ -77,6 +77,7 @@ class EdgeForce {
   // Returns how fast it goes through whole tissue, m/s: p times the mean speed across the edge of
   // the parts that meet some. So it is the same in tough tissue and in soft, and 0 in a wound.
   float cutting_speed_m_s() const { return std::min(1.0f, share_) * speed_m_s_; }
+  bool meets_tissue() const { return cutting_n() > 0 || most_friction_n() > 0; }
   // Returns with how much friction holds it at most, N.
   float most_friction_n() const;
 

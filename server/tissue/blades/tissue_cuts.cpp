@@ -52,7 +52,6 @@ std::optional<topology::Edit> TissueCuts::cut(const BladeTable::Hands& hands,
   const auto lifted = blades_.begin_tick(hands, !report.is_full);
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if ((lifted >> i & 1) != 0) cutter_->lift(i);
-    if (blades_[ToolSlot{i}].is_at_work) last_work_ = world.tick;
     if (!blades_[ToolSlot{i}].is_cutting) continue;
     const auto& moved = blades_[ToolSlot{i}].edge.tissue_m();
     cutter_->carry(i, {to_double(moved[0]), to_double(moved[1])});
@@ -70,6 +69,8 @@ std::optional<topology::Edit> TissueCuts::cut(const BladeTable::Hands& hands,
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
     wounds[i] = {static_cast<float>(output_.blade_work_j[i]), static_cast<float>(cutter_->h_at(i))};
   blades_.end_tick(tools, wounds);
+  for (std::uint8_t i = 0; i < kMaxTools; ++i)
+    if (blades_[ToolSlot{i}].is_in_tissue()) last_work_ = world.tick;
   if (output_.events.events.empty()) return std::nullopt;
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);

@@ -57,7 +57,8 @@ class TissueCuts {
   // Gives what has come to the surface its slots and numbers. The world has applied the edit.
   void extend_layout(const topology::Edit& edit, const world::World& world);
 
-  // Returns the last tick in which a blade was at work or something was cut or torn; 0: none was.
+  // Returns the last tick in which a blade was in tissue or something was cut or torn; 0: there was
+  // none.
   Tick last_work() const { return last_work_; }
   // All edits, oldest first.
   std::span<const cutting::CutEvents> history() const { return history_; }

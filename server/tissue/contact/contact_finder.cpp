@@ -329,10 +329,12 @@ void ContactFinder::plan_way(const ContactScene& scene, ToolContact& contact) {
   contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape);
   contact.start = has_appeared ? tool.pose : proxy.pose;
   const float way = way_between(contact.start, tool.pose, tool.shape);
-  float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
+  const float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
+  float part = way > most ? most / way : 1.0f;
   const bool is_held_back = (scene.held_back >> contact.tool.value & 1) != 0;
-  if (is_held_back && proxy.presses()) most = std::min(most, kHeldBack_m);
-  const float part = way > most ? most / way : 1.0f;
+  if (const float tip_way = length(tool.pose.position - contact.start.position);
+      is_held_back && proxy.presses() && tip_way > kHeldBack_m)
+    part = std::min(part, kHeldBack_m / tip_way);
   contact.goal = part_of_way(contact.start, tool.pose, part);
   lay_path(tool.shape, contact, way * part);
 }

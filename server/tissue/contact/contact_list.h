@@ -68,10 +68,10 @@ inline Vec3f rest_position_of(const ContactPoint& point, const world::World& wor
   return value_at(point, world.rest_positions);
 }
 
-// A tool whose claim is in effect, whether or not it touches anything.
-// A tool that is held back goes so far in a tick, 3 cm/s, while it presses or holds.
+// The tip of a tool that is held back goes so far in a tick, 3 cm/s, while it presses or holds.
 inline constexpr float kHeldBack_m = 0.00003f;
 
+// A tool whose claim is in effect, whether or not it touches anything.
 struct ToolContact {
   ToolSlot tool;
   tool::Verb verb = tool::Verb::None;

@@ -31,7 +31,6 @@ void GraspTable::follow(const hands::ToolTable& tools, std::uint32_t held_back) 
     const float way = grasp.is_anchored ? 0 : jaws_way(grasp.jaws, hand, grasp.reach_m);
     const float most = is_held_back ? kHeldBack_m : grasp.is_behind ? kCatchUp_m : INFINITY;
     grasp.is_behind = way > most;
-    grasp.way_m = std::min(way, most);
     if (!grasp.is_anchored)
       grasp.jaws = grasp.is_behind ? part_of_way(grasp.jaws, hand, most / way) : hand;
   }
@@ -48,7 +47,7 @@ void GraspTable::update_holds(const world::World& world, const hands::ToolTable&
     if (!grips) {
       grasp.nodes.clear();
       grasp.offsets.clear();
-      grasp.grip_n = grasp.reach_m = grasp.closed = grasp.way_m = 0;
+      grasp.grip_n = grasp.reach_m = grasp.closed = 0;
       grasp.is_anchored = grasp.is_behind = false;
       grasp.jaws = {};
     } else if (claim.phase == hands::ClaimPhase::Ramping) {
@@ -136,8 +135,11 @@ void GraspTable::visit_state(world::StateArchive& archive, std::size_t node_coun
     archive.flag(grasp.is_anchored);
     archive.flag(grasp.is_behind);
     archive.value(grasp.jaws);
-    archive.value(grasp.way_m);
     if (!archive.is_reading()) continue;
+    const auto& turn = grasp.jaws.orientation;
+    if (!is_finite(grasp.jaws.position) || !is_finite(Vec3f{turn.x, turn.y, turn.z}) ||
+        !std::isfinite(turn.w))
+      archive.fail();
     if (grasp.nodes.size() != grasp.offsets.size()) archive.fail();
     for (const auto node : grasp.nodes)
       if (node.value >= node_count) archive.fail();

@@ -35,7 +35,6 @@ struct Grasp {
   bool is_anchored = false;      // fading out: the jaws stay where they are
   bool is_behind = false;        // the jaws are not yet where their hand is
   Pose jaws;                     // world_from_tool
-  float way_m = 0;               // that they went in the last tick
 };
 
 // Returns where the jaws hold a node, in the tool's frame.

@@ -127,7 +127,7 @@ LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::Prop
 // sweeps than the uncut mesh needs. While people cut nothing has to rest, and time is short: fewer
 // only keep it from shaking more.
 constexpr std::uint32_t kRestSweeps = 4, kCutSweeps = 2;
-constexpr Tick kRestsAfter = 256;  // from the last work of a blade on
+constexpr Tick kRestsAfter = 256;  // from what a blade did last in tissue
 
 void sweep_until_rest(Tick since_work, dynamics::SolveSettings& settings) {
   const auto least = since_work < kRestsAfter ? kCutSweeps : kRestSweeps;
@@ -306,7 +306,9 @@ ToolFrame describe_tool(const State& state, const contact::ContactList& contacts
   const auto& tool = state.tools[slot];
   ToolFrame frame{.tool = slot, .world_from_tool = tool.pose, .verb = tool.verb};
   frame.has_claim = state.claims.is_in_effect(slot);
-  frame.world_from_proxy = state.proxies[slot].is_placed ? state.proxies[slot].pose : tool.pose;
+  frame.world_from_proxy = state.proxies[slot].is_placed  ? state.proxies[slot].pose
+                           : state.grasps[slot].is_behind ? state.grasps[slot].jaws
+                                                          : tool.pose;
   frame.is_silent = state.world.tick - tool.last_sample_tick > hands::kLeaseTicks;
   for (const auto& contact : contacts.tools) {
     if (contact.tool != slot) continue;

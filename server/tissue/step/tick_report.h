@@ -52,7 +52,7 @@ struct TickDecisions {
   // Graded: nodes that have left the queue stay active for so long.
   std::uint32_t linger_ticks = propagation::kQuietTicks;
 
-  // Bits of tools: their blades wait where they are, and the hands feel it (blades/blades.h); tips
+  // Bits of tools: their blades stop where they are, and the hands feel it (blades/blades.h); tips
   // that press, and jaws that hold, go on slowly (contact/contact_list.h).
   std::uint32_t waiting_tools = 0;
 

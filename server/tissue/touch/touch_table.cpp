@@ -126,7 +126,8 @@ void TouchTable::update(const Scene& scene) {
     touch.kind = kind;
     touch.force = reaction.force_n;
     touch.torque = reaction.torque_nm;
-    if (is_touching(kind)) touch.stiffness.add(tool.pose.position, touch.force);
+    const auto& held_at = kind == TouchKind::Grip ? scene.grasps[slot].jaws : tool.pose;
+    if (is_touching(kind)) touch.stiffness.add(held_at.position, touch.force);
     if (kind != TouchKind::Push) continue;
     // Torque about the tip is the force's lever along the shaft, and what little friction adds.
     const Vec3f shaft = shaft_of(tool.pose);
