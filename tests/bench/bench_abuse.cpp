@@ -136,7 +136,7 @@ double memory_mb() {
   return static_cast<double>(resident) * 4096e-6;
 }
 
-// What a second of simulated time took.
+// A second of simulated time took so much.
 struct Second {
   double rate = 1;  // of real time
   double tick_us = 0;
