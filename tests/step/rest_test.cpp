@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/base/bytes.h"
@@ -205,6 +206,33 @@ TEST(Rest, AWoundThatNobodyTouchesFallsAsleepAndStaysWhereItIs) {
   EXPECT_TRUE(is_touched);
   EXPECT_GT(most, 0.02f);
   EXPECT_LT(worst, 0.04f * most) << "per ms, of a press within 0.24 s";
+}
+
+TEST(Rest, TissueBesideAWoundIsSweptMoreOnceTheBladeHasLeft) {
+  constexpr Tick kOut = 400, kRests = kOut + 280;  // the blade is felt no more after 10 ms
+  auto organ = *catalogue::make_liver(2000);
+  organ.gravity_m_s2 = {0, -9.81, 0};  // It sways.
+  const Vec3f top = to_float(*std::ranges::max_element(organ.mesh.rest_positions, {}, &Vec3d::y));
+  Simulation simulation(organ);
+  hands::TickInputs inputs;
+  hands::HandJoin join{.slot = {0}};
+  join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = 0.05f};
+  inputs.joins.push_back(join);
+  int cutting = 0, resting = 0;
+  for (Tick tick = 1; tick <= kRests + 20; ++tick) {
+    const bool cuts = tick <= kOut;
+    const Vec3f tip{2e-4f * static_cast<float>(tick) - 0.04f, cuts ? -0.025f : 0.2f, 0};
+    inputs.samples.push_back(
+        {tool_slot({0}, 0),
+         {{top + tip, rotation_from_z({0, 1, 0})}, cuts ? tool::Verb::Cut : tool::Verb::None}});
+    const auto& report = simulation.tick(inputs, {});
+    inputs.clear();
+    if (simulation.state().world.origins.empty() || report.solve.node_sweeps == 0) continue;
+    cutting += cuts && report.solve.figures.far_sweeps == 2;
+    resting += tick > kRests && report.solve.figures.far_sweeps == 4;
+  }
+  EXPECT_GT(cutting, 100);
+  EXPECT_EQ(resting, 20);
 }
 
 // The work of a press, of the whole organ that moves with it.
