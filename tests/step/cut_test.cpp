@@ -295,9 +295,11 @@ TEST(Snapshots, ThatMoveNodesAreRefused) {
     cutting::encode(events, hashed);
     auto writing = world::StateArchive::writing(bytes);
     std::uint64_t hash = xxh3_64(hashed);
+    Tick last_work = 0;
     std::uint32_t published = 0, epoch = 0, count = 1;
     bool is_new = false;
     writing.value(hash);
+    writing.value(last_work);
     writing.value(published);
     writing.value(epoch);
     writing.flag(is_new);
@@ -309,7 +311,7 @@ TEST(Snapshots, ThatMoveNodesAreRefused) {
     const auto ignore = [](const topology::Edit&) {};
     auto writing_idle = world::StateArchive::writing(idle);
     uncut.visit_state(writing_idle, ignore);
-    bytes.insert(bytes.end(), idle.begin() + 21, idle.end());
+    bytes.insert(bytes.end(), idle.begin() + 29, idle.end());
     blades::TissueCuts cuts(organ);
     auto reading = world::StateArchive::reading(bytes);
     cuts.visit_state(reading, ignore);

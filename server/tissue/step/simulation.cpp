@@ -84,12 +84,17 @@ bool is_costly(const organ::Organ& organ) {
   return organ::any_material(organ, material::is_hyperelastic);
 }
 
+bool is_under_tension(const material::Material& material) {
+  return material.tension > 0 || material.fibre_tension > 0;
+}
+
 }  // namespace
 
 SolveWork::SolveWork(const Scene& scene, unsigned workers, const world::World& uncut)
     : solver(scene.organ, uncut, workers, scene.strain_scheme),
       far_plan(solver.far_plan(kTickSeconds)),
       has_linear_far_field(is_costly(scene.organ)),
+      has_tension(organ::any_material(scene.organ, is_under_tension)),
       pieces(scene.organ) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
 }

@@ -87,7 +87,7 @@ struct SolveWork {
 
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
-  bool has_linear_far_field;
+  bool has_linear_far_field, has_tension;
   std::array<dynamics::SweepBand, kSweepLayers> bands{};  // of swept nodes, by layer
   pieces::Pieces pieces;
 };
