@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <numbers>
 #include <string>
@@ -16,6 +15,7 @@
 #include "common/math/box.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/bench/resident_memory.h"
 #include "tests/bench/session_clock.h"
 #include "tests/bench/thrown_hands.h"
 
@@ -129,13 +129,6 @@ class Scenes {
   bench::ThrownHands thrown_;
 };
 
-double memory_mb() {
-  std::ifstream file("/proc/self/statm");
-  std::size_t all = 0, resident = 0;
-  file >> all >> resident;
-  return static_cast<double>(resident) * 4096e-6;
-}
-
 // A second of simulated time took so much.
 struct Second {
   double rate = 1;  // of real time
@@ -206,8 +199,8 @@ void run(const Scene& scene, const organ::Organ& organ, double share) {
   for (int i = 0; i < kAway_s; ++i) after = session.run(false);
   const bool is_kept = worst >= kLeastRate && after.rate >= kLeastRateAfter;
   std::printf("| %s | %d | %.0f | %.2f | %.2f | %.0f | %zu | %.0f | %s |\n", scene.name, seconds,
-              sum_us / seconds, worst, after.rate, after.tick_us, session.tets(), memory_mb(),
-              is_kept ? "kept" : "MISSED");
+              sum_us / seconds, worst, after.rate, after.tick_us, session.tets(),
+              bench::resident_mb(), is_kept ? "kept" : "MISSED");
   std::fflush(stdout);
 }
 

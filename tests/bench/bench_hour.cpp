@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 
 #include "client/replay/replay_source.h"
 #include "client/replica/replica.h"
@@ -23,6 +22,7 @@
 #include "server/session/recording/verify.h"
 #include "server/session/replication/frame_encoder.h"
 #include "server/session/replication/messages.h"
+#include "tests/bench/resident_memory.h"
 
 namespace trocar {
 namespace {
@@ -56,14 +56,6 @@ T must(Result<T> result) {
   if (result) return std::move(*result);
   std::fprintf(stderr, "%s: %s\n", kProgram, result.error().message.c_str());
   std::exit(static_cast<int>(ExitCode::BadFile));
-}
-
-// Returns the memory that the program holds now, MB.
-double memory_mb() {
-  std::ifstream file("/proc/self/statm");
-  std::size_t all = 0, resident = 0;
-  file >> all >> resident;
-  return static_cast<double>(resident) * 4096e-6;
 }
 
 // Hands move as a function of the tick and of where the surface is, and nowhere faster than hands
@@ -231,7 +223,7 @@ void print_minute(int minute, const app::LoopReport& report, const step::Simulat
       "| %6d | %6zu | %6zu | %5.0f | %5.0f | %6.0f | %5.0f | %5.0f | %5.0f | %5.0f | %6.2f |\n",
       minute, topology.tet_count(), simulation.layout().vertex_count(), tick.quantile_us(0.5),
       tick.quantile_us(0.99), tick.quantile_us(1), stage(step::Stage::Contacts),
-      stage(step::Stage::Solve), memory_mb(), wire.bytes_per_frame(), journal_mb);
+      stage(step::Stage::Solve), bench::resident_mb(), wire.bytes_per_frame(), journal_mb);
   std::fflush(stdout);
 }
 

@@ -9,7 +9,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <thread>
 
@@ -19,6 +18,7 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/secure/link_file.h"
+#include "tests/bench/resident_memory.h"
 #include "tests/support/child_program.h"
 #include "tests/support/process_cpu.h"
 
@@ -51,12 +51,6 @@ struct Watcher {
   net::NetSource source;
   replica::Replica replica;
 };
-
-double resident_mb_of(pid_t process) {
-  double pages = 0;
-  std::ifstream("/proc/" + std::to_string(process) + "/statm") >> pages >> pages;
-  return pages * 4096e-6;
-}
 
 class Session {
  public:
@@ -176,7 +170,8 @@ void run(const Options& options, Kind kind, int count) {
   const double cpu = testing::cpu_seconds_of_first_thread(session.process()), bytes = received();
   std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));
   const double cpu_used = testing::cpu_seconds_of_first_thread(session.process()) - cpu;
-  const double bytes_got = received() - bytes, memory = resident_mb_of(session.process());
+  const double bytes_got = received() - bytes,
+               memory = bench::resident_mb(std::to_string(session.process()));
   is_stopped = true;
   for (auto& thread : threads) thread.join();
   std::uint64_t frames = 0, by_datagram = 0, faults = 0;

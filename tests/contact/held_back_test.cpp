@@ -53,15 +53,23 @@ TEST(HeldBack, ATipIsSlowWhereItPressesAndFreeWhereItDoesNot) {
   for (const auto& end : {slow, free}) EXPECT_LT(end.behind_m, 1e-4f) << "it has come out";
 }
 
-TEST(HeldBack, JawsThatFadeStayWhereTheyAre) {
-  const auto organ = soft_block();
+// Jaws hold a block's top.
+class HeldBackJaws : public ::testing::Test {
+ protected:
+  HeldBackJaws() {
+    scene.join(0, {.radius_m = 0.004f, .reach_m = 0.012f, .grip_n = 100});
+    scene.hold(0, upright({0, top, 0}), 40, Verb::Grasp);
+  }
+
+  const organ::Organ organ = soft_block();
   const float top = top_of(organ);
-  HandScene scene(organ);
-  scene.join(0, {.radius_m = 0.004f, .reach_m = 0.012f, .grip_n = 100});
-  scene.hold(0, upright({0, top, 0}), 40, Verb::Grasp);
+  HandScene scene{organ};
+  const Grasp& grasp = scene.simulation.state().grasps[ToolSlot{0}];
+};
+
+TEST_F(HeldBackJaws, StayWhereTheyAreWhenTheyFade) {
   scene.decisions.waiting_tools = 0b1;
   scene.hold(0, upright({0, top + 0.01f, 0}), 40, Verb::Grasp);
-  const auto& grasp = scene.simulation.state().grasps[ToolSlot{0}];
   ASSERT_TRUE(grasp.is_behind);
   const Pose jaws = grasp.jaws;
   scene.leave(0);
@@ -70,13 +78,7 @@ TEST(HeldBack, JawsThatFadeStayWhereTheyAre) {
   EXPECT_EQ(grasp.jaws, jaws);
 }
 
-TEST(HeldBack, JawsFollowSlowlyAndCatchUpAfterwards) {
-  const auto organ = soft_block();
-  const float top = top_of(organ);
-  HandScene scene(organ);
-  scene.join(0, {.radius_m = 0.004f, .reach_m = 0.012f, .grip_n = 100});
-  scene.hold(0, upright({0, top, 0}), 40, Verb::Grasp);
-  const auto& grasp = scene.simulation.state().grasps[ToolSlot{0}];
+TEST_F(HeldBackJaws, FollowSlowlyAndCatchUpAfterwards) {
   ASSERT_FALSE(grasp.nodes.empty());
   const auto lift = [&](float up_m, int ticks) {
     float most_m = 0;

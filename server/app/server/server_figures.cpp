@@ -33,7 +33,7 @@ void add_simulation(const ServerFigures& f, Exposition& text) {
                number(pace.slow_ticks));
   text.gauge("time_rate", "Simulated time over real time, in the last second.",
              static_cast<double>(pace.rate.time_rate));
-  text.gauge("waiting_tools",
+  text.gauge("held_back_tools",
              "Tools that were held back in the last second, so that time does not slow.",
              number(static_cast<std::uint64_t>(std::popcount(pace.rate.waiting_tools))));
   text.gauge("rate_level", "0: fixed, 1: all that was asked for, 2: less, 3: overloaded.",
