@@ -65,9 +65,10 @@ Tick ticks_within(float way_m, float squared_speed) {
   return ticks;
 }
 
-// Returns whether it is the turn of what comes every so many ticks, a power of two.
-bool is_turn(std::uint32_t phase, Tick interval, const world::World& world) {
-  return ((world.tick + phase) & (interval - 1)) == 0;
+bool is_asleep_at(std::uint32_t node, const world::World& world) {
+  const auto node_class = world.node_classes[node];
+  return node_class == world::NodeClass::Asleep ||
+         (node_class == world::NodeClass::Fixed && !(length_squared(world.velocities[node]) > 0));
 }
 
 }  // namespace
@@ -90,6 +91,8 @@ bool is_place(const SelfContactPlace& place) {
 void SelfContactTable::visit_state(world::StateArchive& archive,
                                    std::span<const NodeIndex> surface_nodes,
                                    std::size_t triangle_count) {
+  archive.value(last_pass_);
+  archive.value(has_edit_);
   if (archive.is_reading()) {
     clear();
     if (archive.at_end()) return;
@@ -207,11 +210,12 @@ SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const ClosestPoi
   return touch;
 }
 
-namespace {
-float margin_of(float closing) {
-  return std::min(kSelfMargin_m + kSelfTicksAhead * kTickSeconds * std::max(0.0f, closing),
-                  kSelfMaxMargin_m);
+float SelfContactFinder::margin_of(float closing) const {
+  const float seconds = kTickSeconds * (static_cast<float>(pass_interval_) + kSelfTicksAhead);
+  return std::min(kSelfMargin_m + seconds * std::max(0.0f, closing), kSelfMaxMargin_m);
 }
+
+namespace {
 bool lies_along(float aside, float gap) {
   return aside <= kAsidePerGap * std::abs(gap) + kAside_m;
 }
@@ -351,35 +355,38 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-// Active nodes of wounds that have no pair look in every tick: a cut may have opened them just now,
+// Active nodes of wounds that have no pair look in every pass: a cut may have opened them just now,
 // however slow they are.
 void SelfContactFinder::find_pace(const world::World& world, std::span<const NodeIndex> paired) {
-  using world::NodeClass;
-  is_any_awake_ = false;
-  fastest_squared_ = 0;
   auto pair = paired.begin();
   for (const Site s : surface_.sites()) {
     const bool has_pair = pair != paired.end() && pair->value == s;
     if (has_pair) ++pair;
     has_pair_[s] = has_pair ? 1 : 0;
-    const auto node_class = world.node_classes[s];
-    const float squared = length_squared(world.velocities[s]);
-    const bool is_asleep =
-        node_class == NodeClass::Asleep || (node_class == NodeClass::Fixed && squared == 0);
-    const bool may_be_fresh =
-        node_class == NodeClass::Active && !has_pair && surface_.is_of(s, Sort::Wound);
+    const bool may_be_fresh = world.node_classes[s] == world::NodeClass::Active && !has_pair &&
+                              surface_.is_of(s, Sort::Wound);
     const bool looks =
-        may_be_fresh || is_turn(phases_[s], ticks_within(kLookDrift_m, squared), world);
-    paces_[s] = is_asleep ? Pace::Asleep : looks ? Pace::Looks : Pace::Waits;
-    is_any_awake_ |= !is_asleep;
-    fastest_squared_ = std::max(fastest_squared_, squared);
+        may_be_fresh ||
+        is_turn(phases_[s], ticks_within(kLookDrift_m, length_squared(world.velocities[s])), world);
+    paces_[s] = is_asleep_at(s, world) ? Pace::Asleep : looks ? Pace::Looks : Pace::Waits;
   }
 }
 
-bool SelfContactFinder::is_asleep(Site site, TriangleIndex triangle) const {
-  return paces_[site] == Pace::Asleep && std::ranges::all_of(surface_[triangle], [this](Site s) {
-           return paces_[s] == Pace::Asleep;
-         });
+// Finds what decides whether there is a pass.
+void SelfContactFinder::survey(const world::World& world) {
+  is_any_awake_ = false;
+  fastest_squared_ = 0;
+  for (const Site s : surface_.sites()) {
+    is_any_awake_ |= !is_asleep_at(s, world);
+    fastest_squared_ = std::max(fastest_squared_, length_squared(world.velocities[s]));
+  }
+  pass_interval_ = std::min(kPassEvery, ticks_within(kPassDrift_m, fastest_squared_));
+}
+
+bool SelfContactFinder::is_asleep(Site site, TriangleIndex triangle,
+                                  const world::World& world) const {
+  return is_asleep_at(site, world) &&
+         std::ranges::all_of(surface_[triangle], [&](Site s) { return is_asleep_at(s, world); });
 }
 
 float SelfContactFinder::squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,
@@ -430,9 +437,18 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
     ++out.dropped;
     return;
   }
-  const NodeIndex node(site);
-  pairs.add(node, triangle, place);
-  if (is_asleep(site, triangle)) return;
+  pairs.add(NodeIndex(site), triangle, place);
+  add_point(pairs, pairs.nodes().size() - 1, world, out);
+}
+
+// Adds the point of a pair, unless nobody has to solve it.
+void SelfContactFinder::add_point(const SelfContactTable& pairs, std::size_t pair,
+                                  const world::World& world, ContactList& out) const {
+  const NodeIndex node = pairs.nodes()[pair];
+  const Site site = node.value;
+  const auto triangle = pairs.triangles()[pair];
+  const Place& place = pairs.places()[pair];
+  if (is_asleep(site, triangle, world)) return;
   // Clang 14 lets no lambda capture a structured binding.
   const auto& corners = surface_[triangle];
   const Site a = corners[0], b = corners[1], c = corners[2];
@@ -451,7 +467,7 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
       .nodes = {node, NodeIndex(a), NodeIndex(b), NodeIndex(c)},
       .weights = {1, -w.x, -w.y, -w.z},
       .node_count = 4,
-      .id = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
+      .id = static_cast<std::uint32_t>(pair),
       .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value],
       .limit_n = kNoLimit_n,
       .normal = place.normal,
@@ -462,13 +478,38 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
   out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
 }
 
+namespace {
+// Seeds are ascending, each once.
+void tidy_seeds(ContactList& out) {
+  auto& seeds = out.self_seeds;
+  std::ranges::sort(seeds);
+  seeds.erase(std::unique(seeds.begin(), seeds.end()), seeds.end());
+}
+}  // namespace
+
 void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs, ContactList& out) {
+  survey(world);
   pairs_looked_at_ = 0;
+  const bool is_due = pairs.has_edit() || world.tick - pairs.last_pass() >= pass_interval_;
+  if (is_due || !is_any_awake_) return pass(world, pairs, out);
+  for (std::size_t i = 0; i < pairs.nodes().size(); ++i) add_point(pairs, i, world, out);
+  tidy_seeds(out);
+}
+
+void SelfContactFinder::find_again(const world::World& world, SelfContactTable& pairs,
+                                   ContactList& out) {
+  survey(world);
+  pass(world, pairs, out);
+}
+
+void SelfContactFinder::pass(const world::World& world, SelfContactTable& pairs, ContactList& out) {
+  if (pairs.last_pass() != world.tick) pass_before_ = pairs.last_pass();
+  pairs.note_pass(world.tick);
+  if (!is_any_awake_) return;
   find_pace(world, pairs.nodes());
   // No two nodes approach faster than twice the fastest moves.
   margin_now_m_ =
       std::min(kSelfMaxMargin_m, margin_of(2.001f * std::sqrt(fastest_squared_)) + kRounding_m);
-  if (!is_any_awake_) return;
   keep_list(world);
   const auto& runs = list_.runs;
   // Two nodes are nearer to each other than their references by slack_m_ at most.
@@ -482,7 +523,7 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     tick_current_ = 1;
   }
   stir(world);
-  std::swap(old_pairs_, pairs);
+  pairs.swap_pairs(old_pairs_);
   pairs.clear();
   // Nodes with a pair and nodes with something listed, together ascending.
   const auto nodes = old_pairs_.nodes();
@@ -497,7 +538,7 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     if (is_old && !surface_.is_gone(old_pairs_.triangles()[i])) {
       const auto triangle = old_pairs_.triangles()[i];
       const auto& place = old_pairs_.places()[i];
-      if (is_asleep(site, triangle) || !is_due(site, triangle, place.weights, world)) {
+      if (is_asleep(site, triangle, world) || !is_due(site, triangle, place.weights, world)) {
         add_pair(site, triangle, place, world, pairs, out);
         continue;
       }
@@ -519,9 +560,7 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
              out);
   }
-  std::ranges::sort(out.self_seeds);
-  out.self_seeds.erase(std::unique(out.self_seeds.begin(), out.self_seeds.end()),
-                       out.self_seeds.end());
+  tidy_seeds(out);
 }
 
 }  // namespace trocar::contact

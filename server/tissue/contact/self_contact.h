@@ -30,9 +30,13 @@
 // moved by kLookDrift_m, which is little beside the margin. Pairs of nodes that are asleep
 // (server/tissue/pieces) stay as they are and are given to nobody.
 //
+// All this is done in passes, kPassEvery ticks apart: each tick while something is fast, and in the
+// tick after an edit. In between pairs press where they are.
+//
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
-// have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
-// tick: O(pairs with nodes that look), nothing where nothing is near.
+// have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Each
+// pass: O(pairs with nodes that look), nothing where nothing is near; each tick O(surface nodes +
+// pairs).
 // An edit adds the pairs around it to the list, and to the one that is being made: O(what is within
 // reach of it), and a look at each surface node's place.
 // Pairs are a function of the state: results do not depend on when lists were made.
@@ -51,14 +55,18 @@ namespace trocar::contact {
 // Pa/m, of both sides together: twice a tool's (contact_finder.h), for there is no hand that could
 // back off. 10 kPa press walls 0.2 mm into each other.
 inline constexpr float kSelfStiffnessPaPerM = 5e7f;
-// Pairs are made when this near, or so many ticks before they touch at their present speed, but
-// never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
+// Pairs are made when this near, or so many ticks before they touch at their present speed as there
+// are from pass to pass and kSelfTicksAhead, but never from farther than kSelfMaxMargin_m: enough
+// for 1.3 m/s.
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
-inline constexpr float kSelfTicksAhead = 1.5f;
+inline constexpr float kSelfTicksAhead = 0.5f;
 inline constexpr float kDrift_m = 6.4e-6f, kNearDrift_m = 0.8e-6f, kLookDrift_m = 1e-4f;
 // A pair that presses and drifts by so much in a tick is swept most.
 inline constexpr float kSeedDrift_m = 1.28e-5f;
 inline constexpr Tick kLookEvery = 64;  // a power of two
+// From one pass to the next nothing goes farther than kPassDrift_m, if it goes on as fast.
+inline constexpr Tick kPassEvery = 4;  // a power of two
+inline constexpr float kPassDrift_m = 8e-4f;
 
 // A place is where a node lay on its triangle when the pair was last looked at.
 struct SelfContactPlace {
@@ -84,15 +92,23 @@ class SelfContactTable {
 
   std::span<const SelfContactPlace> places() const { return places_; }
 
+  // The tick of the last pass, and whether the topology was edited since. At first all is new.
+  Tick last_pass() const { return last_pass_; }
+  bool has_edit() const { return has_edit_ != 0; }
+  void note_pass(Tick tick) { last_pass_ = tick, has_edit_ = 0; }
+  void note_edit() { has_edit_ = 1; }
+
   void clear() { nodes_.clear(), triangles_.clear(), places_.clear(); }
+  void swap_pairs(SelfContactTable& other) {
+    nodes_.swap(other.nodes_), triangles_.swap(other.triangles_), places_.swap(other.places_);
+  }
   void add(NodeIndex node, TriangleIndex triangle, const SelfContactPlace& place) {
     nodes_.push_back(node);
     triangles_.push_back(triangle);
     places_.push_back(place);
   }
 
-  // Takes no bytes without pairs. Last in a state. surface_nodes: ascending; triangle_count:
-  // numbers given so far.
+  // Last in a state. surface_nodes: ascending; triangle_count: numbers given so far.
   void visit_state(world::StateArchive& archive, std::span<const NodeIndex> surface_nodes,
                    std::size_t triangle_count);
 
@@ -100,14 +116,19 @@ class SelfContactTable {
   std::vector<NodeIndex> nodes_;
   std::vector<TriangleIndex> triangles_;
   std::vector<SelfContactPlace> places_;
+  Tick last_pass_ = 0;
+  std::uint8_t has_edit_ = 1;
 };
 
 class SelfContactFinder {
  public:
   explicit SelfContactFinder(const organ::Organ& organ);
 
-  // After ContactFinder::find(): brings the pairs up to date and adds their points to `out`.
+  // After ContactFinder::find(): brings the pairs up to date, if it is time for a pass, and adds
+  // their points to `out`.
   void find(const world::World& world, SelfContactTable& pairs, ContactList& out);
+  // Once more in the same tick, for tissue that has woken, and with a pass in any case.
+  void find_again(const world::World& world, SelfContactTable& pairs, ContactList& out);
 
   // The world has its new nodes.
   void update(const topology::Edit& edit, const world::World& world);
@@ -246,8 +267,16 @@ class SelfContactFinder {
   Nearest find_nearest(Site site, std::size_t first, std::size_t end, const world::World& world);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
+  void survey(const world::World& world);
+  void pass(const world::World& world, SelfContactTable& pairs, ContactList& out);
   void find_pace(const world::World& world, std::span<const NodeIndex> paired);
-  bool is_asleep(Site site, TriangleIndex triangle) const;
+  bool is_asleep(Site site, TriangleIndex triangle, const world::World& world) const;
+  // Returns whether it is the turn, in this pass, of what comes every so many ticks, a power of
+  // two.
+  bool is_turn(std::uint32_t phase, Tick interval, const world::World& world) const {
+    return ((world.tick + phase) & (interval - 1)) < world.tick - pass_before_;
+  }
+  float margin_of(float closing) const;
   // Returns the squared speed at which a pair leaves its place, m2/s2.
   float squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,
                       const world::World& world) const;
@@ -259,6 +288,8 @@ class SelfContactFinder {
                     const world::World& world) const;
   void add_pair(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
                 SelfContactTable& pairs, ContactList& out) const;
+  void add_point(const SelfContactTable& pairs, std::size_t pair, const world::World& world,
+                 ContactList& out) const;
 
   SelfSurface surface_;
   std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
@@ -297,7 +328,9 @@ class SelfContactFinder {
   std::vector<Pace> paces_;                // per node, of this tick; for surface nodes
   bool is_any_awake_ = true;               // of these
   float fastest_squared_ = 0;              // of these, m2/s2
-  float margin_now_m_ = 0;                 // Pairs begin within this in this tick.
+  Tick pass_interval_ = 1;                 // as fast as that
+  Tick pass_before_ = 0;                   // the tick of the pass before this tick's
+  float margin_now_m_ = 0;                 // Pairs begin within this in this pass.
   std::vector<std::uint32_t> near_stamp_;  // per node
   // Per node: in this tick a node that looks is listed with it. If it waits and has no pair, these
   // are the nearest of those that look.

@@ -6,6 +6,7 @@ void hand_out(const topology::Edit& edit, State& state) {
   state.world.apply(edit);
   state.cuts.extend_layout(edit, state.world);
   state.quantised.resize(state.cuts.layout().vertex_count());
+  state.self_contacts.note_edit();
   for (const auto& made : edit.new_nodes) {
     if (made.has_moved()) continue;
     state.claims.add_node(made.a, made.b);

@@ -61,16 +61,13 @@ ContactReport find_contacts(State& state, const TickDecisions& decisions, bool m
                        .tick = state.world.tick,
                        .held_back = decisions.waiting_tools},
                       found);
-  const auto find_self = [&] {
-    if (decisions.policy.has_self_contact)
-      contact.self_finder.find(state.world, state.self_contacts, found);
-  };
-  find_self();
+  const bool has_self = decisions.policy.has_self_contact;
+  if (has_self) contact.self_finder.find(state.world, state.self_contacts, found);
   if (solve.pieces.wake_touched(found, state.world)) {
     hand_out_pieces(state.world, solve);
     found.points.resize(found.self_begin);
     found.self_seeds.clear();
-    find_self();
+    if (has_self) contact.self_finder.find_again(state.world, state.self_contacts, found);
   }
   return {.nodes = static_cast<std::uint32_t>(found.seeds.size()),
           .self_pairs = static_cast<std::uint32_t>(state.self_contacts.nodes().size()),
