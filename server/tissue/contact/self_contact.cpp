@@ -355,15 +355,16 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-// Active nodes of wounds that have no pair look in every pass: a cut may have opened them just now,
-// however slow they are.
+// After an edit active nodes of wounds that have no pair look, however slow they are: it may have
+// opened them just now.
 void SelfContactFinder::find_pace(const world::World& world, std::span<const NodeIndex> paired) {
   auto pair = paired.begin();
   for (const Site s : surface_.sites()) {
     const bool has_pair = pair != paired.end() && pair->value == s;
     if (has_pair) ++pair;
     has_pair_[s] = has_pair ? 1 : 0;
-    const bool may_be_fresh = world.node_classes[s] == world::NodeClass::Active && !has_pair &&
+    const bool may_be_fresh = follows_edit_ && !has_pair &&
+                              world.node_classes[s] == world::NodeClass::Active &&
                               surface_.is_of(s, Sort::Wound);
     const bool looks =
         may_be_fresh ||
@@ -503,7 +504,10 @@ void SelfContactFinder::find_again(const world::World& world, SelfContactTable& 
 }
 
 void SelfContactFinder::pass(const world::World& world, SelfContactTable& pairs, ContactList& out) {
-  if (pairs.last_pass() != world.tick) pass_before_ = pairs.last_pass();
+  if (pairs.last_pass() != world.tick) {
+    pass_before_ = pairs.last_pass();
+    follows_edit_ = pairs.has_edit();
+  }
   pairs.note_pass(world.tick);
   if (!is_any_awake_) return;
   find_pace(world, pairs.nodes());

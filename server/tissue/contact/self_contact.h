@@ -330,6 +330,7 @@ class SelfContactFinder {
   float fastest_squared_ = 0;              // of these, m2/s2
   Tick pass_interval_ = 1;                 // as fast as that
   Tick pass_before_ = 0;                   // the tick of the pass before this tick's
+  bool follows_edit_ = false;              // there was an edit since that
   float margin_now_m_ = 0;                 // Pairs begin within this in this pass.
   std::vector<std::uint32_t> near_stamp_;  // per node
   // Per node: in this tick a node that looks is listed with it. If it waits and has no pair, these

@@ -89,7 +89,8 @@ BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world,
   packed_slots_.reserve(world.node_count());
   schedule_.reserve(kUsualSweeps);
   relaxed_lanes_.reserve(group_count);
-  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_, &relaxed_}) plan->reserve(groups);
+  for (auto* plan : {&near_, &far_, &far_swept_, &cut_swept_, &last_, &begun_, &relaxed_})
+    plan->reserve(groups);
   for (auto& band : bands_)
     for (auto* plan : {&band.nodes, &band.kept, &band.packed}) plan->reserve(groups);
   const auto map = organ::material_map(organ);
@@ -515,6 +516,8 @@ void BlockDescent::execute_schedule(const contact::ContactList& contacts,
     if (tolerance > 0 && squares <= enough) break;
   }
   report.far_node_sweeps = settings.far_sweeps * far_swept_.node_count;
+  if (settings.cut_sweeps > settings.far_sweeps)
+    report.far_node_sweeps += (settings.cut_sweeps - settings.far_sweeps) * cut_swept_.node_count;
   report.node_sweeps += report.far_node_sweeps;
 }
 

@@ -47,6 +47,8 @@ struct SolveSettings {
   float residual_tolerance_n = 0;
   std::uint32_t far_sweeps = 0;
   float far_over_relaxation = 1.3f;
+  // Far nodes whose elements an edit has changed get at least so many sweeps.
+  std::uint32_t cut_sweeps = 0;
   // Far nodes are swept in every so many steps, one group of eight after another, each then for all
   // the time since; in between they coast. Solve once per world.tick, then.
   std::uint32_t far_interval = 1;
@@ -254,6 +256,8 @@ class BlockDescent {
 
   std::vector<Constants> constants_;    // per group
   std::vector<std::uint8_t> free_;      // per group: lanes of nodes that is_swept() names
+  std::vector<std::uint8_t> cut_;       // likewise: whose elements an edit has changed
+  std::vector<std::uint8_t> is_cut_;    // per node: likewise
   std::vector<Float4> x_;               // per slot: displacements being solved, else the world's
   std::vector<Float4> v_;               // per slot: the world's velocities
   std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
@@ -267,6 +271,7 @@ class BlockDescent {
   std::vector<GroupLanes> relaxed_lanes_;
   SweepPlan relaxed_;    // whose forces of relaxed stress a step takes anew
   SweepPlan far_swept_;  // of far_, in this step; the others coast
+  SweepPlan cut_swept_;  // of far_swept_: nodes whose elements an edit has changed
   SweepPlan last_;       // the last sweep: of near_ and far_swept_
   std::unique_ptr<LinearFarField> linear_far_field_;  // null: not used
   bool is_far_linear_ = false;                        // in this step

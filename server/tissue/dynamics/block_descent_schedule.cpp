@@ -21,7 +21,7 @@ constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
 void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSettings& settings,
                              Tick tick, const ExternalLoads& loads) {
   const auto& groups = tissue_.groups();
-  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_}) plan->clear();
+  for (auto* plan : {&near_, &far_, &far_swept_, &cut_swept_, &last_, &begun_}) plan->clear();
   for (auto& band : bands_)
     for (auto* plan : {&band.nodes, &band.kept, &band.packed}) plan->clear();
   for (const auto node : near) near_.add(groups, node);
@@ -34,6 +34,10 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSetting
       if (!is_slow(g) || (g / kPhaseGroups + tick) % far_interval_ == 0) far_swept_.add(g, lanes);
     }
   far_swept_.finish(groups);
+  if (settings.cut_sweeps > settings.far_sweeps)
+    for (const auto g : far_swept_.groups)
+      cut_swept_.add(g, static_cast<std::uint8_t>(far_swept_.lanes[g] & cut_[g]));
+  cut_swept_.finish(groups);
   for (const auto g : near_.groups) begun_.add(g, 0xff);
   for (const auto g : is_far_linear_ ? all_groups_ : far_.groups) begun_.add(g, 0xff);
   for (const auto node : loads.held) begun_.add(groups.slot_of(node) / kLanes, 0xff);
@@ -82,8 +86,8 @@ void BlockDescent::schedule_sweeps(const SolveSettings& settings) {
   };
   for (auto left = settings.sweeps; left > 0; --left) {
     const bool ends_far = left == 1 && settings.far_sweeps > 0;
-    for (std::uint32_t far = 1; ends_far && far < settings.far_sweeps; ++far)
-      schedule_.push_back({.plan = &far_swept_});
+    for (auto far = std::max(settings.far_sweeps, settings.cut_sweeps); ends_far && far > 1; --far)
+      schedule_.push_back({.plan = far > settings.far_sweeps ? &cut_swept_ : &far_swept_});
     const NearBand& near = band_of(left, settings.bands);
     schedule_.push_back({.plan = ends_far     ? &last_
                                  : has_packs_ ? &near.kept

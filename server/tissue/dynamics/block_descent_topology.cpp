@@ -13,8 +13,8 @@ void BlockDescent::resize_arrays() {
   constants_.resize(group_count);
   inertia_.resize(group_count);
   squares_.resize(group_count);
-  for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes,
-                      &last_.lanes, &begun_.lanes, &relaxed_.lanes})
+  for (auto* lanes : {&free_, &cut_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes,
+                      &cut_swept_.lanes, &last_.lanes, &begun_.lanes, &relaxed_.lanes})
     lanes->resize(group_count);
   for (auto& band : bands_)
     for (auto* plan : {&band.nodes, &band.kept}) plan->lanes.resize(group_count);
@@ -35,6 +35,8 @@ UpdateReport BlockDescent::update_topology(const topology::Topology& topology,
   const auto report = tissue_.update_topology(topology);
   const auto& groups = tissue_.groups();
   resize_arrays();
+  is_cut_.resize(world.node_count());
+  for (const auto node : topology.changed()) is_cut_[node.value] = 1;
   for (const auto lanes : tissue_.touched())
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!lanes.has(lane)) continue;
@@ -47,7 +49,9 @@ UpdateReport BlockDescent::update_topology(const topology::Topology& topology,
       constants_[g].mass.v[lane] = mass;
       constants_[g].damping.v[lane] = mass * static_cast<float>(material.node_damping_per_s);
       const bool is_free = has_node && is_swept(node, world);
+      const bool is_cut = has_node && is_cut_[node.value] == 1;
       free_[g] = static_cast<std::uint8_t>((free_[g] & ~(1u << lane)) | unsigned{is_free} << lane);
+      cut_[g] = static_cast<std::uint8_t>((cut_[g] & ~(1u << lane)) | unsigned{is_cut} << lane);
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
       v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
     }

@@ -129,7 +129,7 @@ constexpr Tick kRestsAfter = 256;  // from what a blade did last in tissue
 void sweep_until_rest(bool is_being_cut, dynamics::SolveSettings& settings) {
   const auto least = is_being_cut ? kCutSweeps : kRestSweeps;
   settings.sweeps = std::max(settings.sweeps, least);
-  settings.far_sweeps = std::max(settings.far_sweeps, least);
+  settings.cut_sweeps = least;
   settings.bands = {};
 }
 
