@@ -122,13 +122,15 @@ LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::Prop
 
 // Tets along wounds are small and stiff: what moves there without a tool comes to rest under more
 // sweeps than the uncut mesh needs. While people cut nothing has to rest, and time is short: fewer
-// only keep it from shaking more. Where there is tension, what is cut shakes too long after those.
+// only keep it from shaking more. Where there is tension, what is cut shakes too long after those,
+// and tangles stay unless all that pulls at them is swept as often.
 constexpr std::uint32_t kRestSweeps = 4, kCutSweeps = 2;
 constexpr Tick kRestsAfter = 256;  // from what a blade did last in tissue
 
-void sweep_until_rest(bool is_being_cut, dynamics::SolveSettings& settings) {
-  const auto least = is_being_cut ? kCutSweeps : kRestSweeps;
+void sweep_until_rest(bool is_being_cut, bool has_tension, dynamics::SolveSettings& settings) {
+  const auto least = is_being_cut && !has_tension ? kCutSweeps : kRestSweeps;
   settings.sweeps = std::max(settings.sweeps, least);
+  if (has_tension) settings.far_sweeps = std::max(settings.far_sweeps, least);
   settings.cut_sweeps = least;
   settings.bands = {};
 }
@@ -198,8 +200,7 @@ SolveReport solve(const contact::ContactList& contacts, bool may_rest,
   auto settings = settings_of(decisions, work);
   const bool has_untouched_wounds = contacts.tools.empty() && !world.origins.empty();
   if (may_rest && has_untouched_wounds && !(settings.residual_tolerance_n > 0))
-    sweep_until_rest(world.tick < state.cuts.last_work() + kRestsAfter && !work.has_tension,
-                     settings);
+    sweep_until_rest(world.tick < state.cuts.last_work() + kRestsAfter, work.has_tension, settings);
   auto report = solve_steps(contacts, nodes, settings, decisions.policy.steps_per_tick, loads,
                             world, work.solver);
   const auto settled =
