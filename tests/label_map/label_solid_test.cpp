@@ -62,6 +62,13 @@ TEST(LabelSolid, ChoosesLabelsAndOneBody) {
   ASSERT_TRUE(kept.ok()) << kept.error().message;
   ASSERT_EQ(kept->warnings().size(), 1u);
   EXPECT_NE(kept->warnings()[0].find("dropped 1 separate bodies"), std::string::npos);
+  EXPECT_TRUE(kept->warnings()[0].ends_with(" of the volume, 0.001 ml")) << kept->warnings()[0];
+  auto stone = crumb;
+  stone.labels[stone.index(1, 1, 1)] = 9;
+  const auto without = LabelSolid::make(stone, {}, "a.nii");
+  ASSERT_TRUE(without.ok()) << without.error().message;
+  EXPECT_TRUE(without->warnings()[0].ends_with("and with them all of these labels: 9"))
+      << without->warnings()[0];
   for (int k = 0; k < 50; ++k)
     for (int j = 0; j < 50; ++j)
       for (int i = 0; i < 2; ++i) crumb.labels[crumb.index(i, j, k)] = 1;

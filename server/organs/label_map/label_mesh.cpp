@@ -10,6 +10,7 @@
 
 #include "server/organs/label_map/label_field.h"
 #include "server/organs/label_map/label_fit.h"
+#include "server/organs/label_map/thin_labels.h"
 #include "server/organs/mesh/conform.h"
 #include "server/organs/mesh/fill_field.h"
 #include "server/organs/mesh/match_volumes.h"
@@ -19,9 +20,8 @@ namespace {
 
 constexpr double kGoodCount = 0.05, kAcceptableCount = 0.15;  // shares of the asked number
 constexpr int kAttempts = 6;
-constexpr double kFewer = 0.93;         // share of the lattice's nodes where a number gives no mesh
-constexpr double kKeptInMesh = 0.8;     // share of a label's voxels below which the report warns
-constexpr double kMissedVolume = 0.05;  // share of a label's volume from which on it warns
+constexpr double kFewer = 0.93;      // share of the lattice's nodes where a number gives no mesh
+constexpr double kKeptInMesh = 0.8;  // share of a label's voxels below which the report warns
 
 using Names = std::vector<std::pair<std::uint16_t, std::string>>;
 
@@ -38,8 +38,7 @@ std::string name_of(std::uint16_t label, const Names& names) {
   return named == names.end() ? "label " + std::to_string(label) : named->second;
 }
 
-// The largest first: where tets could belong to several by their nodes, the smallest, such as a
-// tumour, goes before.
+// The largest first: a node of several belongs to the smallest, such as a tumour.
 std::vector<std::uint16_t> largest_first(const LabelSolid& solid) {
   auto labels = solid.labels();
   std::ranges::stable_sort(labels, std::ranges::greater{},
@@ -47,31 +46,18 @@ std::vector<std::uint16_t> largest_first(const LabelSolid& solid) {
   return labels;
 }
 
-std::vector<NodeIndex> nodes_of(const Filled& filled, std::uint16_t label) {
-  std::vector<std::uint8_t> is_there(filled.mesh.node_count(), 0);
+// The tets of a label and their nodes.
+mesh::NamedNodes region_of(const Filled& filled, std::uint16_t label, const std::string& name) {
+  mesh::NamedNodes region{name, {}, {}};
   for (std::size_t t = 0; t < filled.mesh.tets.size(); ++t)
-    if (filled.tet_labels[t] == label)
-      for (const NodeIndex node : filled.mesh.tets[t]) is_there[node.value] = 1;
-  std::vector<NodeIndex> nodes;
-  for (std::size_t n = 0; n < is_there.size(); ++n)
-    if (is_there[n]) nodes.emplace_back(n);
-  return nodes;
-}
-
-// A tet belongs to the last region that holds its nodes, as everywhere where organs are used.
-std::vector<std::vector<NodeIndex>> settle_regions(const std::vector<std::uint16_t>& labels,
-                                                   Filled& filled) {
-  std::vector<std::vector<NodeIndex>> regions;
-  for (const auto label : labels) regions.push_back(nodes_of(filled, label));
-  for (std::size_t r = 0; r < labels.size(); ++r) {
-    std::vector<std::uint8_t> is_inside(filled.mesh.node_count(), 0);
-    for (const NodeIndex node : regions[r]) is_inside[node.value] = 1;
-    for (std::size_t t = 0; t < filled.mesh.tets.size(); ++t)
-      if (std::ranges::all_of(filled.mesh.tets[t],
-                              [&](NodeIndex n) { return is_inside[n.value] != 0; }))
-        filled.tet_labels[t] = labels[r];
-  }
-  return regions;
+    if (filled.tet_labels[t] == label) {
+      region.tets.emplace_back(t);
+      region.nodes.insert(region.nodes.end(), filled.mesh.tets[t].begin(),
+                          filled.mesh.tets[t].end());
+    }
+  std::ranges::sort(region.nodes);
+  region.nodes.erase(std::ranges::unique(region.nodes).begin(), region.nodes.end());
+  return region;
 }
 
 Result<Filled> fill(const LabelSolid& solid, int nodes) {
@@ -156,8 +142,8 @@ void warn_of_losses(const LabelFit& fit, const std::string& name, const LabelSol
   if (!is_in_pieces && fit.kept >= kKeptInMesh &&
       std::abs(fit.mesh_m3 / fit.map_m3 - 1) < kMissedVolume)
     return;
-  std::string text =
-      fmt::format("{}: {:.0f} % of its voxels lie in it", name, std::floor(100 * fit.kept));
+  std::string text = fmt::format("{}: {:.0f} % of its voxels lie in it, {:.3g} ml beside it", name,
+                                 std::floor(100 * fit.kept), 1e6 * (1 - fit.kept) * fit.map_m3);
   if (is_in_pieces)
     text += fmt::format(", it is in {} pieces, the map's in {}", fit.mesh_pieces, fit.map_pieces);
   warnings.push_back(text + ": it is too thin for the mesh; " + advice(fit, solid));
@@ -165,12 +151,20 @@ void warn_of_losses(const LabelFit& fit, const std::string& name, const LabelSol
 
 void add_regions(const LabelSolid& solid, const Names& names, Filled& filled, LabelMesh& out) {
   const auto labels = largest_first(solid);
-  const auto regions = settle_regions(labels, filled);
   std::vector<std::pair<std::uint16_t, double>> volumes;
   for (std::size_t l = labels.size(); l-- > 1;)
     volumes.emplace_back(labels[l], solid.volume_of(labels[l]));
-  mesh::match_volumes(filled.mesh, filled.tet_labels, volumes,
-                      kMaxInterfaceShift * filled.spacing_m, mesh::conforming_bound());
+  const auto match = [&] {
+    mesh::match_volumes(filled.mesh, filled.tet_labels, volumes,
+                        kMaxInterfaceShift * filled.spacing_m, mesh::conforming_bound());
+  };
+  const auto places = filled.mesh.rest_positions;
+  match();
+  std::vector<std::uint16_t> smallest_first(labels.rbegin(), labels.rend() - 1);
+  if (fill_thin_labels(solid, filled.mesh, smallest_first, filled.tet_labels)) {
+    filled.mesh.rest_positions = places;
+    match();
+  }
   const auto fits = fit_of_labels(solid, filled.mesh, filled.tet_labels);
   for (std::size_t l = 0; l < labels.size(); ++l) {
     const auto name = name_of(labels[l], names);
@@ -178,15 +172,17 @@ void add_regions(const LabelSolid& solid, const Names& names, Filled& filled, La
     out.notes.push_back(fmt::format("{}: {:.4g} ml, {:+.2f} % of the map's {:.4g} ml", name,
                                     1e6 * fit.mesh_m3, 100 * (fit.mesh_m3 / fit.map_m3 - 1),
                                     1e6 * fit.map_m3));
-    if (regions[l].empty()) {
-      out.imported.warnings.push_back(
-          name + " is too small for the mesh, and left out: " + advice(fit, solid));
+    auto region = region_of(filled, labels[l], name);
+    if (region.tets.empty()) {
+      out.imported.left_out.push_back(
+          fmt::format("left out {}, {:.3g} ml: it is too small for the mesh; {}", name,
+                      1e6 * fit.map_m3, advice(fit, solid)));
       continue;
     }
     // The largest gets what the others lose, and theirs is the warning.
     if (l > 0 || fit.mesh_pieces > fit.map_pieces)
       warn_of_losses(fit, name, solid, out.imported.warnings);
-    out.imported.regions.push_back({name, regions[l]});
+    out.imported.regions.push_back(std::move(region));
   }
   out.notes.push_back(
       fmt::format("interfaces follow faces of tets; through {} tets of {} one passes", filled.steps,

@@ -4,8 +4,9 @@
 //
 // The surface of the mesh follows the solid's, and faces of tets the interfaces between labels
 // (mesh/conform.h). Interfaces are then moved by a small part of the spacing, so that each label
-// has its volume (mesh/match_volumes.h). Where a label is thinner than the mesh, warnings say how
-// much of it is there, and in how many pieces.
+// has its volume (mesh/match_volumes.h). A label that is thinner than the mesh is given whole tets
+// for it (thin_labels.h), and warnings say how much of it is at its place, and in how many pieces.
+// A region is of tets, and not of all whose nodes it has.
 
 #include <string>
 #include <vector>

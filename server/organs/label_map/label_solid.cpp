@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <set>
 
 namespace trocar::label_map {
 namespace {
@@ -159,12 +160,21 @@ Status LabelSolid::keep_largest_body(const std::string& name) {
   if (share < kLargestShare)
     return Error{ErrorCode::BadFile, name + ": is " + std::to_string(sizes.size() - 1) +
                                          " separate bodies: choose one structure (--labels)"};
+  std::set<std::uint16_t> kept, lost;
+  for (std::size_t i = 0; i < body.size(); ++i)
+    if (map_.labels[i] != 0) (body[i] == largest ? kept : lost).insert(map_.labels[i]);
   for (std::size_t i = 0; i < body.size(); ++i)
     if (body[i] != largest) map_.labels[i] = 0;
   char text[120];
-  std::snprintf(text, sizeof text, "dropped %zu separate bodies that have %.2g %% of the volume",
-                sizes.size() - 2, 100 * (1 - share));
-  map_.warnings.push_back(text);
+  std::snprintf(text, sizeof text,
+                "dropped %zu separate bodies that have %.2g %% of the volume, %.3g ml",
+                sizes.size() - 2, 100 * (1 - share),
+                1e6 * static_cast<double>(all - sizes[largest]) * map_.voxel_volume_m3());
+  std::string whole;
+  for (const auto label : lost)
+    if (!kept.contains(label)) whole += (whole.empty() ? "" : ", ") + std::to_string(label);
+  map_.warnings.push_back(text +
+                          (whole.empty() ? "" : ", and with them all of these labels: " + whole));
   return {};
 }
 
