@@ -292,6 +292,21 @@ TEST(GlbReader, WhatIsNoTriangleInRestIsLeftOutAndSaid) {
                                       "left out the other 1 scenes"}));
 }
 
+TEST(GlbReader, NamesOfWhatIsInTheSceneAreSaid) {
+  Glb glb;
+  glb.json["nodes"][0]["name"] = "Gef\u00e4\u00df";
+  glb.json["nodes"].push_back({{"name", "camera"}});
+  glb.json["meshes"][0]["name"] = 7;
+  const auto surface = parse_glb(glb.file(), "a.glb");
+  ASSERT_TRUE(surface.ok()) << surface.error().message;
+  EXPECT_EQ(surface->left_out,
+            std::vector<std::string>{"left out the names of nodes: 'Gef\u00e4\u00df'"});
+  glb.json["meshes"][0]["name"] = "vessel";
+  const auto both = parse_glb(glb.file(), "a.glb");
+  ASSERT_TRUE(both.ok());
+  EXPECT_EQ(both->left_out.front(), "left out the names of meshes: 'vessel'");
+}
+
 TEST(GlbReader, AFileThatIsNoneIsRefusedAtEachLength) {
   const std::string whole = Glb().file();
   for (std::size_t size = 0; size < whole.size(); ++size)

@@ -143,9 +143,33 @@ TEST(LeftOut, WhatSurfacesHaveBesideTheirShapeIsSaid) {
                  "a.ply"),
             (Lines{"left out of each vertex: 'red'", "left out of each face: 'label'"}));
   const std::string corners = "o all\nv 0 0 0\nv 1 0 0\nv 0 1 0\n", face = "f 1 2 3\n";
-  EXPECT_EQ(said(corners + "usemtl a\n" + face, "a.obj"), Lines{});
-  EXPECT_EQ(said(corners + "g lobe\n" + face + "g vein\n" + face, "a.obj"),
-            Lines{"left out g: 'lobe', 'vein'"});
+  EXPECT_EQ(said(corners + "usemtl red paint\n" + face, "a.obj"),
+            (Lines{"left out the names of materials: 'red paint'",
+                   "left out the names of objects: 'all'"}));
+  EXPECT_EQ(said(corners.substr(6) + "g lobe\n" + face + "g vein lobe\ng\n" + face, "a.obj"),
+            Lines{"left out the names of groups: 'lobe', 'vein'"});
+}
+
+TEST(LeftOut, NamesOfSolidsAndColoursOfStlAreSaid) {
+  const auto said = [](const std::string& text) {
+    const auto file = parse_mesh(text, "a.stl");
+    EXPECT_TRUE(file.ok()) << file.error().message;
+    return file.ok() ? std::get<surface::RawSurface>(*file).left_out : Lines{};
+  };
+  const auto solid = [](const std::string& name) {
+    return "solid " + name +
+           "\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+           "endloop\nendfacet\nendsolid\n";
+  };
+  EXPECT_EQ(said(solid("liver")), Lines{"left out the names of solids: 'liver'"});
+  EXPECT_EQ(said(solid("the liver") + solid("Foie") + solid("")),
+            Lines{"left out the names of solids: 'Foie', 'the liver'"});
+  EXPECT_EQ(said(solid("")), Lines{});
+  std::string binary(84 + 50, '\0');
+  binary[80] = 1;
+  EXPECT_EQ(said(binary), Lines{});
+  binary.back() = 'c';
+  EXPECT_EQ(said(binary), Lines{"left out the attributes, such as colours, of 1 triangles"});
 }
 
 std::string of_vtk(const std::string& data) {

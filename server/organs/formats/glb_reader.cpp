@@ -9,6 +9,7 @@
 
 #include "common/base/json.h"
 #include "server/organs/formats/glb_numbers.h"
+#include "server/organs/formats/part_names.h"
 #include "server/organs/formats/text_reader.h"
 #include "server/organs/formats/weld.h"
 
@@ -99,6 +100,7 @@ class GlbReader {
     if (const Json* scenes = member(json_, "scenes"); scenes->size() > 1)
       surface.left_out.push_back("left out the other " + std::to_string(scenes->size() - 1) +
                                  " scenes");
+    parts_.say(surface.left_out);
     if (picture_) {
       surface.picture = std::string(view(*find(element("images", *picture_), "bufferView")));
       if (lacks_place_) fault_ = "some of its meshes have no place in the picture";
@@ -260,10 +262,17 @@ class GlbReader {
       const Motion motion = above * motion_of(node, name);
       if (const auto mesh = find(node, "mesh")) {
         check_weights(node, element("meshes", *mesh), name);
+        note_name("nodes", node);
+        note_name("meshes", element("meshes", *mesh));
         add_mesh(*mesh, motion);
       }
       add_nodes(node, "children", name, motion, waiting);
     }
+  }
+
+  void note_name(const char* kind, const Json& part) {
+    if (const Json* name = member(part, "name"); name != nullptr && name->is_string())
+      parts_.add(kind, name->get_ref<const std::string&>());
   }
 
   // Those of a node go before those of its mesh.
@@ -377,6 +386,7 @@ class GlbReader {
                                  const std::string& name) {
     std::size_t set = 0;
     if (const auto material = find(primitive, "material")) {
+      note_name("materials", element("materials", *material));
       const Json* colour = member(element("materials", *material), "pbrMetallicRoughness");
       const Json* texture = colour == nullptr ? nullptr : member(*colour, "baseColorTexture");
       if (texture != nullptr) {
@@ -415,6 +425,7 @@ class GlbReader {
   Json json_;
   std::size_t primitives_ = 0;  // of the nodes so far
   std::size_t skipped_ = 0;     // lists of points or lines
+  PartNames parts_;
   std::vector<Vec3d> corners_;
   std::vector<std::array<std::array<double, 2>, 3>> texture_;
   std::optional<std::size_t> picture_;  // number of the image

@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <optional>
-#include <set>
 #include <vector>
 
+#include "server/organs/formats/part_names.h"
 #include "server/organs/formats/polygon.h"
 #include "server/organs/formats/text_reader.h"
-#include "server/organs/mesh/raw_tets.h"
 
 namespace trocar::formats {
 namespace {
@@ -99,9 +97,9 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
   TextReader in(text, name, '#');
   surface::RawSurface surface;
   std::vector<ObjFace> faces;
-  std::vector<std::array<double, 2>> places;           // in a picture
-  std::size_t skipped = 0;                             // points and lines
-  std::map<std::string, std::set<std::string>> parts;  // names of objects, groups and materials
+  std::vector<std::array<double, 2>> places;  // in a picture
+  std::size_t skipped = 0;                    // points and lines
+  PartNames parts;
   while (in.next_line()) {
     const auto keyword = in.word();
     if (keyword.empty()) continue;
@@ -126,8 +124,10 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
       return in.error(shown(keyword) + " is not known: save the surface as triangles");
     } else {
       skipped += keyword == "p" || keyword == "l";
-      if (keyword == "o" || keyword == "g" || keyword == "usemtl")
-        parts[std::string(keyword)].insert(plain_name(in.word()));
+      if (keyword == "o") parts.add("objects", in.line());
+      if (keyword == "usemtl") parts.add("materials", in.line());
+      if (keyword == "g")  // of a face that is in several
+        for (auto word = in.word(); !word.empty(); word = in.word()) parts.add("groups", word);
     }
   }
   std::int64_t number = 0;
@@ -137,10 +137,7 @@ Result<surface::RawSurface> parse_obj(std::string_view text, const std::string& 
       return Error{ErrorCode::BadFile,
                    name + ":" + std::to_string(face.line) + ": " + s.error().message};
   add_texture(faces, cuts, places, name, surface);
-  for (const auto& [keyword, names] : parts)
-    if (names.size() > 1)  // one is a name of the whole
-      surface.left_out.push_back("left out " + keyword + ": " +
-                                 mesh::list_of({names.begin(), names.end()}));
+  parts.say(surface.left_out);
   if (skipped > 0)
     surface.left_out.push_back("left out " + std::to_string(skipped) + " points and lines");
   return surface;

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <vector>
 
+#include "server/organs/formats/part_names.h"
 #include "server/organs/formats/text_reader.h"
 #include "server/organs/formats/weld.h"
 
@@ -26,10 +27,12 @@ Result<surface::RawSurface> parse_binary(std::string_view text, const std::strin
                     std::to_string(in.remaining() / kTriangleBytes) +
                     (in.remaining() % kTriangleBytes == 0 ? "" : " and a part"));
   std::vector<Vec3d> corners;
+  std::size_t painted = 0;
   for (std::uint32_t t = 0; t < count; ++t) {
     const auto bytes = in.bytes(kTriangleBytes);
     std::array<float, 12> numbers{};
     std::memcpy(numbers.data(), bytes.data(), sizeof numbers);
+    painted += bytes.substr(sizeof numbers) != std::string_view("\0\0", 2);
     for (std::size_t i = 3; i < 12; i += 3) {
       const Vec3d p{numbers[i], numbers[i + 1], numbers[i + 2]};
       if (!is_finite(p))
@@ -38,7 +41,11 @@ Result<surface::RawSurface> parse_binary(std::string_view text, const std::strin
       corners.push_back(p);
     }
   }
-  return weld(corners);
+  auto surface = weld(corners);
+  if (painted > 0)
+    surface.left_out.push_back("left out the attributes, such as colours, of " +
+                               std::to_string(painted) + " triangles");
+  return surface;
 }
 
 // Any number of solids after one another; each begins and ends with a line of its own. Keywords are
@@ -46,6 +53,7 @@ Result<surface::RawSurface> parse_binary(std::string_view text, const std::strin
 Result<surface::RawSurface> parse_text(std::string_view text, const std::string& name) {
   TextReader in(text, name);
   std::vector<Vec3d> corners;
+  PartNames parts;
   const auto expect = [&](std::initializer_list<std::string_view> words) -> Status {
     for (const auto word : words)
       if (const auto found = in.token(); lower(found) != word)
@@ -56,6 +64,7 @@ Result<surface::RawSurface> parse_text(std::string_view text, const std::string&
   };
   while (in.next_filled_line()) {
     if (lower(in.word()) != "solid") return in.error("expected 'solid', found " + shown(in.line()));
+    parts.add("solids", in.line());
     if (auto s = in.need_line("solid"); !s) return s.error();
     while (lower(in.line().substr(0, 5)) == "facet") {
       if (auto s = expect({"facet", "normal"}); !s) return s.error();
@@ -77,7 +86,9 @@ Result<surface::RawSurface> parse_text(std::string_view text, const std::string&
     if (lower(in.word()) != "endsolid")
       return in.error("expected 'facet' or 'endsolid', found " + shown(in.line()));
   }
-  return weld(corners);
+  auto surface = weld(corners);
+  parts.say(surface.left_out);
+  return surface;
 }
 
 }  // namespace
