@@ -60,4 +60,22 @@ std::string printable(std::string_view text, std::size_t limit) {
   return shown;
 }
 
+std::string as_name(std::string_view text, std::size_t limit) {
+  std::string name;
+  while (!text.empty()) {
+    std::uint32_t code_point = 0;
+    const auto size = decode_code_point(text, code_point);
+    const auto byte = static_cast<unsigned char>(text.front());
+    const std::string latin{static_cast<char>(0xc0 | byte >> 6),
+                            static_cast<char>(0x80 | (byte & 0x3f))};
+    const auto own = !is_printable(size > 0 ? code_point : byte) ? std::string_view("_")
+                     : size > 0                                  ? text.substr(0, size)
+                                                                 : std::string_view(latin);
+    if (name.size() + own.size() > limit) break;
+    name += own;
+    text.remove_prefix(size > 0 ? size : 1);
+  }
+  return name;
+}
+
 }  // namespace trocar

@@ -21,4 +21,8 @@ bool is_printable(std::string_view text);
 // The text with a question mark for each character that cannot be printed, at most `limit` bytes.
 std::string printable(std::string_view text, std::size_t limit = 1000);
 
+// A name from outside as one of ours: printable UTF-8 of at most `limit` bytes. Bytes that are no
+// UTF-8 are taken for Latin-1, and what cannot be printed becomes an underscore.
+std::string as_name(std::string_view text, std::size_t limit);
+
 }  // namespace trocar

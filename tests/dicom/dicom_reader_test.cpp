@@ -81,6 +81,24 @@ TEST_F(DicomReader, ReadsTheSegmentsOfASegmentationWithTheirNames) {
   EXPECT_EQ(map->names, names);
 }
 
+// The file says of which set of characters its texts are: Unicode, Latin, Cyrillic.
+TEST_F(DicomReader, NamesOfSegmentsAreUtf8WhateverTheFilesSetIs) {
+  const auto name_with = [&](const char* set, const std::string& bytes) {
+    const auto map = read_dicom(segmentation([&](DcmItem& data) {
+      if (set != nullptr) put(data, DCM_SpecificCharacterSet, set);
+      put(*add(data, DCM_SegmentSequence, 0), DCM_SegmentLabel, bytes);
+    }));
+    EXPECT_TRUE(map.ok()) << map.error().message;
+    return map.ok() ? map->names.front().second : "";
+  };
+  EXPECT_EQ(name_with("ISO_IR 192", "\u809d\u81d3"), "\u809d\u81d3");
+  EXPECT_EQ(name_with("ISO_IR 100", "Gef\xe4\xdf"), "Gef\u00e4\u00df");
+  EXPECT_EQ(name_with("ISO_IR 144", "\xdf\xd5\xe7\xd5\xdd\xec"),
+            "\u043f\u0435\u0447\u0435\u043d\u044c");
+  EXPECT_EQ(name_with("NONE OF THEM", "Gef\xe4\xdf"), "Gef\xe4\xdf");
+  EXPECT_EQ(name_with(nullptr, "Liver"), "Liver");
+}
+
 TEST_F(DicomReader, ReadsAFolderOfLabelSlicesInWhateverOrder) {
   series();
   std::ofstream(folder_ / "notes.txt") << "no DICOM";

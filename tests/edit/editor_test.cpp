@@ -130,6 +130,8 @@ TEST(Editor, RefusesRegionsThatCannotBe) {
   const auto all = box(first, "all");
   EXPECT_FALSE(editor.add_region("", all).ok());
   EXPECT_FALSE(editor.add_region("a\nb", all).ok());
+  EXPECT_FALSE(editor.add_region("Gef\xe4\xdf", all).ok())
+      << "Latin-1, which no organ file can hold";
   EXPECT_FALSE(editor.add_region(std::string(201, 'a'), all).ok());
   EXPECT_FALSE(editor.add_region("dot", Nodes{NodeIndex(0)}).ok());
   ASSERT_TRUE(editor.add_region("all", all).ok());

@@ -98,6 +98,14 @@ TEST(Loopback, only_addresses_of_this_machine) {
     EXPECT_FALSE(is_loopback(address)) << address;
 }
 
+TEST(Printable, a_name_is_utf8_and_bytes_that_are_none_are_taken_for_latin1) {
+  EXPECT_EQ(as_name("Gef\u00e4\u00df", 40), "Gef\u00e4\u00df");
+  EXPECT_EQ(as_name("Gef\xe4\xdf", 40), "Gef\u00e4\u00df");
+  EXPECT_EQ(as_name("a\x1b[m\u202e\x80\xff", 40), "a_[m__\u00ff");
+  EXPECT_EQ(as_name("\u00e4\u00e4\u00e4", 5), "\u00e4\u00e4") << "no half of a letter";
+  EXPECT_EQ(as_name("", 5), "");
+}
+
 TEST(Printable, what_cannot_be_printed_becomes_a_question_mark) {
   EXPECT_EQ(printable("Ada \xc3\x96zlem"), "Ada \xc3\x96zlem");
   EXPECT_EQ(printable("a\x1b[31mb\n\x7f"), "a?[31mb??");

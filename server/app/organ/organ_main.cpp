@@ -12,6 +12,7 @@
 
 #include "common/base/log.h"
 #include "common/base/number_option.h"
+#include "common/base/printable.h"
 #include "common/base/program.h"
 #include "common/base/stdout_check.h"
 #include "common/base/version.h"
@@ -143,7 +144,8 @@ Result<organ::Organ> make_from_scenario(const std::string& path, const std::opti
   if (!parsed) return parsed.error();
   auto resolved = scenario::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
-  resolved->organ.name = std::filesystem::path(path).stem().string();
+  resolved->organ.name =
+      as_name(std::filesystem::path(path).stem().string(), organ::kMostNameBytes);
   return std::move(resolved->organ);
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <variant>
 
+#include "common/base/printable.h"
 #include "server/organs/formats/mesh_file.h"
 #include "server/organs/formats/text_reader.h"
 #include "server/organs/label_map/label_mesh.h"
@@ -19,13 +20,56 @@
 namespace trocar::catalogue {
 namespace {
 
-// Names travel in messages and file headers, which must be plain text.
-std::string plain(const std::string& text) {
-  std::string out = text.substr(0, 200);
-  for (char& c : out)
-    if (c < 32 || c > 126) c = '_';
-  return out.empty() ? "organ" : out;
+std::string own_name(std::string_view name) {
+  return as_name(name, organ::kMostNameBytes);
 }
+
+// Names for what a file names, and which of them became others.
+class Naming {
+ public:
+  // Returns the name as an organ may have it.
+  std::string own(const std::string& name) {
+    auto own = own_name(name);
+    if (own.empty()) own = "unnamed";
+    if (own != name) add(kept_.empty() ? "" : ", ", printable(name, 60), own, kept_);
+    return own;
+  }
+  // Gives each a name of its own.
+  void name(std::vector<mesh::NamedNodes>& sets) {
+    std::set<std::string> taken;
+    for (auto& set : sets) taken.insert(set.name = own(set.name));
+    std::map<std::string, int> count;  // of each name so far
+    for (auto& set : sets) {
+      const std::string name = set.name;
+      int& nth = count[name];
+      ++nth;
+      if (nth == 1) continue;
+      const auto numbered = [&] { return fmt::format("{}-{}", as_name(name, 180), nth); };
+      while (taken.contains(numbered())) ++nth;
+      set.name = numbered();
+      taken.insert(set.name);
+      add(shared_.empty() ? "the next " : ", the next ", name, set.name, shared_);
+    }
+  }
+  // what: all of them, such as "regions".
+  void say(const char* what, std::vector<std::string>& warnings) const {
+    if (!kept_.empty())
+      warnings.push_back(fmt::format("names of {} must be 1 to {} bytes of printable UTF-8, so {}",
+                                     what, organ::kMostNameBytes, kept_));
+    if (!shared_.empty()) warnings.push_back(fmt::format("{} share a name, so {}", what, shared_));
+  }
+
+ private:
+  static void add(const char* before, const std::string& name, const std::string& own,
+                  std::string& list) {
+    if (list.size() < 200)
+      list += fmt::format("{}'{}' is '{}' here", before, name, own);
+    else if (!list.ends_with("..."))
+      list += ", ...";
+  }
+
+  std::string kept_, shared_;
+};
 
 const char* name_of(mesh::Unit unit) {
   return unit == mesh::Unit::Metre ? "m" : unit == mesh::Unit::Centimetre ? "cm" : "mm";
@@ -92,14 +136,14 @@ Result<Labels> find_labels(const Labels& wanted, const Labels& there, const std:
   Labels labels;
   for (const auto& want : wanted.empty() ? there : wanted) {
     const auto& [label, name] = want;
-    const auto is_named_so = [&want](const auto& one) { return plain(one.second) == want.second; };
+    const auto is_named_so = [&want](const auto& one) { return one.second == want.second; };
     const auto known = std::ranges::find_if(there, [&](const auto& one) {
       return want.first == 0 ? is_named_so(one) : one.first == want.first;
     });
     if (label == 0 && known == there.end()) {
       std::string text;
       for (const auto& [number, known_name] : there)
-        text += fmt::format("{} {}:{}", text.empty() ? "" : ",", number, plain(known_name));
+        text += fmt::format("{} {}:{}", text.empty() ? "" : ",", number, known_name);
       return Error{ErrorCode::Usage, fmt::format("--labels: {} has no label '{}', {}", file, name,
                                                  there.empty() ? "and names none: choose by number"
                                                                : "it has" + text)};
@@ -109,10 +153,10 @@ Result<Labels> find_labels(const Labels& wanted, const Labels& there, const std:
                                                  "choose by number, such as {}:NAME",
                                                  file, name, known->first)};
     const bool has_name = known != there.end() && name.empty();
-    labels.emplace_back(label == 0 ? known->first : label, has_name ? plain(known->second)
+    labels.emplace_back(label == 0 ? known->first : label, has_name ? known->second
                                                            : name.empty()
                                                                ? fmt::format("label {}", label)
-                                                               : plain(name));
+                                                               : name);
   }
   // Names that the map itself gives twice are told apart later.
   if (wanted.empty()) return labels;
@@ -201,38 +245,14 @@ std::string names_of(const std::vector<mesh::NamedNodes>& sets) {
   return text;
 }
 
-// Gives each a name of its own; a warning says which got another. `what`: all of them.
-void make_distinct(std::vector<mesh::NamedNodes>& sets, const char* what,
-                   std::vector<std::string>& warnings) {
-  std::set<std::string> taken;
-  for (const auto& set : sets) taken.insert(plain(set.name));
-  std::map<std::string, int> count;  // of each name so far
-  std::string text;
-  for (auto& set : sets) {
-    const std::string name = plain(set.name);
-    int& nth = count[name];
-    ++nth;
-    if (nth == 1) continue;
-    const auto numbered = [&] { return fmt::format("{}-{}", name.substr(0, 180), nth); };
-    while (taken.contains(numbered())) ++nth;
-    set.name = numbered();
-    taken.insert(set.name);
-    if (text.size() < 200)
-      text += fmt::format("{}the next '{}' is '{}' here", text.empty() ? "" : ", ", name, set.name);
-    else if (!text.ends_with("..."))
-      text += ", ...";
-  }
-  if (!text.empty()) warnings.push_back(fmt::format("{} share a name, so {}", what, text));
-}
-
 // Regions of the organ's own material, for others to be given. They say their tets only where
 // others than those would be in them by their nodes.
 void add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
   if (regions.empty()) return;
-  result.notes.push_back("regions: " + plain(names_of(regions)));
+  result.notes.push_back("regions: " + names_of(regions));
   organ::Organ& organ = result.organ;
   for (const auto& region : regions)
-    organ.regions.push_back({plain(region.name), organ.material, region.nodes, {}});
+    organ.regions.push_back({region.name, organ.material, region.nodes, {}});
   const auto by_nodes = organ::material_map(organ).tets;
   for (std::size_t r = 0; r < regions.size(); ++r)
     organ.regions[r].tets = std::move(regions[r].tets);
@@ -242,19 +262,20 @@ void add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
 
 Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& sets,
             ImportedOrgan& result) {
-  if (!sets.empty()) result.notes.push_back("sets of nodes: " + plain(names_of(sets)));
+  if (!sets.empty()) result.notes.push_back("sets of nodes: " + names_of(sets));
   if (!options.fix_set) {
     result.organ.fixed_nodes = organ::nodes_held_by(options.fix, result.organ.mesh);
     return {};
   }
-  auto set = std::ranges::find(sets, *options.fix_set, &mesh::NamedNodes::name);
+  const std::string name = own_name(*options.fix_set);
+  auto set = std::ranges::find(sets, name, &mesh::NamedNodes::name);
   if (set == sets.end())
-    set = std::ranges::find(sets, formats::lower(*options.fix_set),
+    set = std::ranges::find(sets, formats::lower(name),
                             [](const auto& one) { return formats::lower(one.name); });
   if (set == sets.end())
     return Error{ErrorCode::Usage,
-                 "--fix: the file has no set '" + plain(*options.fix_set) +
-                     (sets.empty() ? "', it has none" : "', it has: " + plain(names_of(sets)))};
+                 "--fix: the file has no set '" + name +
+                     (sets.empty() ? "', it has none" : "', it has: " + names_of(sets))};
   result.organ.fixed_nodes = set->nodes;
   return {};
 }
@@ -265,16 +286,20 @@ Result<ImportedOrgan> make_organ(mesh::ImportedMesh imported, const std::filesys
                                  ImportedOrgan result) {
   result.warnings = std::move(imported.warnings);
   organ::Organ& organ = result.organ;
-  organ.name = plain(options.name.value_or(imported_name(path)));
-  organ.source = plain(path.filename().string()) +
+  Naming of_organ, of_regions, of_sets;
+  organ.name = of_organ.own(options.name.value_or(imported_name(path)));
+  of_organ.say("organs", result.warnings);
+  organ.source = own_name(path.filename().string()) +
                  (has_unit ? std::string(", unit ") + name_of(options.unit) : "") + ", fix " +
-                 (options.fix_set ? "set:" + plain(*options.fix_set) : to_text(options.fix));
+                 (options.fix_set ? "set:" + own_name(*options.fix_set) : to_text(options.fix));
   organ.mesh = std::move(imported.mesh);
   if (auto warning = size_warning(organ.mesh, options.unit); !warning.empty())
     result.warnings.push_back(std::move(warning));
   organ.source_offset_m = imported.offset_m;
-  make_distinct(imported.regions, "regions", result.warnings);
-  make_distinct(imported.node_sets, "sets of nodes", result.warnings);
+  of_regions.name(imported.regions);
+  of_regions.say("regions", result.warnings);
+  of_sets.name(imported.node_sets);
+  of_sets.say("sets of nodes", result.warnings);
   add_regions(std::move(imported.regions), result);
   if (auto s = hold(options, imported.node_sets, result); !s) return s.error();
   std::ranges::move(imported.left_out, std::back_inserter(result.warnings));
@@ -304,7 +329,7 @@ Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::str
     const auto colon = std::min(part.find(':'), part.size());
     // A name alone: the map says its number.
     if (colon == part.size() && !part.empty() && (part[0] < '0' || part[0] > '9')) {
-      labels.emplace_back(std::uint16_t{0}, plain(std::string(part)));
+      labels.emplace_back(std::uint16_t{0}, own_name(part));
       continue;
     }
     if (colon + 1 == part.size())
@@ -312,15 +337,15 @@ Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::str
           ErrorCode::Usage,
           fmt::format("--labels: '{}' has no name behind its colon: say one, or the number "
                       "alone",
-                      plain(std::string(part)))};
+                      own_name(part))};
     int label = 0;
     const auto [end, error] = std::from_chars(part.data(), part.data() + colon, label);
     if (error != std::errc{} || end != part.data() + colon || label < 1 || label > 65535)
       return Error{ErrorCode::Usage,
                    fmt::format("--labels: '{}' is no label, such as 2 or 2:tumour, from 1 to 65535",
-                               part.empty() ? "" : plain(std::string(part)))};
+                               own_name(part))};
     labels.emplace_back(static_cast<std::uint16_t>(label),
-                        std::string(part.substr(std::min(colon + 1, part.size()))));
+                        own_name(part.substr(std::min(colon + 1, part.size()))));
   }
   return labels;
 }
@@ -330,8 +355,12 @@ Result<ImportedOrgan> import_labels(label_map::LabelMap map, const std::filesyst
   ImportedOrgan result;
   result.unit_m = map.unit_m;
   result.axes = surface::Axes::LeftHeadFront;
+  Naming naming;
+  std::erase_if(map.names, [](const auto& one) { return one.second.empty(); });
+  for (auto& [label, name] : map.names) name = naming.own(name);
   auto imported = fill_labels(std::move(map), path.string(), options, result.notes);
   if (!imported) return imported.error();
+  naming.say("labels", imported->warnings);
   return make_organ(std::move(*imported), path, options, options.unit_is_said, std::move(result));
 }
 

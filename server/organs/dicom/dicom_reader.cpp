@@ -75,6 +75,9 @@ class Reader {
   Error error(const std::string& what) const { return {ErrorCode::BadFile, name_ + ": " + what}; }
   DcmItem& data() { return data_; }
   const std::string& name() const { return name_; }
+  // Texts are in the set of characters that the file says. One that is not known here, or not kept
+  // to, leaves their bytes as they are.
+  void make_utf8() { static_cast<void>(data_.convertToUTF8()); }
 
   Result<int> whole(const DcmTagKey& key, const char* attribute, int least, int most) {
     Uint16 value = 0;
@@ -244,6 +247,7 @@ class SegmentationReader {
   }
 
   Status read_segments() {
+    reader_.make_utf8();
     DcmItem* segment = nullptr;
     for (long i = 0; reader_.data().findAndGetSequenceItem(DCM_SegmentSequence, segment, i).good();
          ++i) {

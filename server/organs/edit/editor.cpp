@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/printable.h"
 #include "server/organs/material/material_keys.h"
 #include "server/organs/organ/any_material.h"
 #include "server/organs/organ/average_strain.h"
@@ -10,7 +11,6 @@
 namespace trocar::edit {
 namespace {
 
-constexpr std::size_t kMostNameBytes = 200;
 constexpr std::size_t kMostSourceBytes = 4000;  // to which something is still added
 constexpr const char* kEdited = ", edited";
 
@@ -48,9 +48,7 @@ bool holds_an_element(const mesh::TetMesh& mesh, const Nodes& nodes) {
 }
 
 bool is_name(const std::string& name) {
-  return !name.empty() && name.size() <= kMostNameBytes && std::ranges::none_of(name, [](char c) {
-    return static_cast<unsigned char>(c) < 32 || c == 127;
-  });
+  return !name.empty() && name.size() <= organ::kMostNameBytes && is_printable(name);
 }
 
 // nodes: ascending.
@@ -130,7 +128,8 @@ bool Editor::release(std::span<const NodeIndex> nodes) {
 Status Editor::check_name(const std::string& name) const {
   if (!is_name(name))
     return Error{ErrorCode::Usage, "the name of a region must have 1 to " +
-                                       std::to_string(kMostNameBytes) + " printable bytes"};
+                                       std::to_string(organ::kMostNameBytes) +
+                                       " bytes of printable UTF-8"};
   if (std::ranges::find(organ_.regions, name, &material::MaterialRegion::name) !=
       organ_.regions.end())
     return Error{ErrorCode::Usage,

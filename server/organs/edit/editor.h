@@ -43,8 +43,8 @@ class Editor {
   bool release(std::span<const NodeIndex> nodes);
 
   // A region of these nodes with the organ's own material, after the others: it wins where they
-  // overlap. Returns its number. Error: the name is taken or not of 1 to 200 printable bytes, or no
-  // element has all of its nodes among these.
+  // overlap. Returns its number. Error: the name is taken or not of 1 to 200 bytes of printable
+  // UTF-8, or no element has all of its nodes among these.
   Result<std::size_t> add_region(const std::string& name, std::span<const NodeIndex> nodes);
   // They change nothing where there is no such region. A region without an element of its own left
   // goes away. Returns whether anything changed.

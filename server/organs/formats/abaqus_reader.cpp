@@ -309,7 +309,7 @@ class AbaqusReader {
     std::vector<std::uint8_t> is_in_set(flats.size());
     mesh::RegionSets regions(raw.tets.size());
     const auto add_nodes = [&raw](const std::string& name, std::vector<NodeIndex> members) {
-      if (!members.empty()) raw.node_sets.push_back({plain_name(name), std::move(members)});
+      if (!members.empty()) raw.node_sets.push_back({name, std::move(members)});
     };
     for (const auto& [name, set] : node_sets_.in_order) {
       std::vector<NodeIndex> members;
@@ -318,7 +318,7 @@ class AbaqusReader {
     }
     for (const auto& [name, set] : element_sets_.in_order) {
       if (const auto members = members_of(set, tets, is_taken); !members.empty())
-        regions.add(plain_name(name), members);
+        regions.add(name, members);
       std::vector<NodeIndex> members;
       for (const auto i : members_of(set, flats, is_taken)) {
         is_in_set[i] = 1;

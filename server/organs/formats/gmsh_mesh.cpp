@@ -124,8 +124,7 @@ Status GmshMesh::add_physical_name(std::int64_t dimension, std::int64_t number,
                      ", must be 0 to 3");
   if (quoted.size() < 2 || quoted.front() != '"' || quoted.back() != '"')
     return in_.error("the name of a physical group must stand in quotation marks");
-  const std::string name = plain_name(quoted.substr(1, quoted.size() - 2));
-  names_[{dimension, number}] = name;
+  names_[{dimension, number}] = quoted.substr(1, quoted.size() - 2);
   return {};
 }
 

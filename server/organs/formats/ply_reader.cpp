@@ -212,8 +212,7 @@ class PlyReader {
     if (element.name != "vertex" && element.name != "face") return;
     std::vector<std::string> names;
     for (const Property& p : element.properties)
-      if (std::ranges::find(kTaken, p.name) == std::end(kTaken))
-        names.push_back(plain_name(p.name));
+      if (std::ranges::find(kTaken, p.name) == std::end(kTaken)) names.push_back(p.name);
     if (element.count > 0 && !names.empty())
       surface_.left_out.push_back("left out of each " + element.name + ": " + mesh::list_of(names));
   }

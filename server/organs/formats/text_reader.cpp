@@ -11,7 +11,6 @@ namespace trocar::formats {
 namespace {
 
 constexpr std::size_t kMaxShownBytes = 40;
-constexpr std::size_t kMaxNameBytes = 100;
 constexpr const char* kBlanks = " \t\r\v\f";
 
 template <typename T>
@@ -34,14 +33,7 @@ std::string_view behind_mark(std::string_view text) {
 }
 
 std::string shown(std::string_view text) {
-  std::string out = "'";
-  for (const char c : text.substr(0, kMaxShownBytes)) out += c >= 32 && c < 127 ? c : '?';
-  return out + (text.size() > kMaxShownBytes ? "...'" : "'");
-}
-
-std::string plain_name(std::string_view text) {
-  const std::string name = printable(text, kMaxNameBytes);
-  return name.empty() ? "unnamed" : name;
+  return "'" + printable(text, kMaxShownBytes) + (text.size() > kMaxShownBytes ? "...'" : "'");
 }
 
 bool parse_whole(std::string_view text, std::int64_t& value) {

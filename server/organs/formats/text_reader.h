@@ -70,8 +70,6 @@ std::string lower(std::string_view text);
 std::string_view behind_mark(std::string_view text);
 // A part of a foreign file made safe to print on one line, in quotation marks.
 std::string shown(std::string_view text);
-// A name from a foreign file as a name of ours: printable, not empty, at most 100 bytes.
-std::string plain_name(std::string_view text);
 bool parse_whole(std::string_view text, std::int64_t& value);
 // Only finite numbers; "1d5" as Fortran writes them is none.
 bool parse_finite(std::string_view text, double& value);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/base/printable.h"
 #include "server/organs/mesh/pieces.h"
 #include "server/organs/mesh/places.h"
 
@@ -14,6 +15,7 @@ constexpr double kMaxCoordinate_m = 1e9;  // from here on a double cannot hold a
 // A tet with less volume than this share of its longest edge cubed is flat: a regular one has
 // 0.118, one with dihedral angles of one degree about 0.001.
 constexpr double kFlat = 1e-6;
+constexpr std::size_t kMostListedBytes = 120;  // of a name in a list
 
 class Builder {
  public:
@@ -278,7 +280,7 @@ std::string list_of(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) {
     if (text.size() > 200) return text + ", ...";
-    text += (text.empty() ? "'" : ", '") + name + "'";
+    text += (text.empty() ? "'" : ", '") + as_name(name, kMostListedBytes) + "'";
   }
   return text;
 }
@@ -299,7 +301,8 @@ void RegionSets::finish(RawTets& raw) && {
     if (tets == region_of_.size())
       whole.push_back(name);
     else if (kept < tets)
-      cut.push_back(name + ": " + std::to_string(kept) + " of " + std::to_string(tets));
+      cut.push_back(as_name(name, kMostListedBytes / 2) + ": " + std::to_string(kept) + " of " +
+                    std::to_string(tets));
   }
   if (!whole.empty())
     raw.left_out.push_back("no region, as it holds all elements: " + list_of(whole));

@@ -27,7 +27,7 @@ Result<Unit> parse_unit(std::string_view text);
 double metres_of(Unit unit);
 
 struct NamedNodes {
-  std::string name;
+  std::string name;              // as the file has it, whatever bytes these are
   std::vector<NodeIndex> nodes;  // ascending, distinct
   std::vector<TetIndex> tets;    // likewise, of a region
 };
@@ -76,7 +76,8 @@ struct ImportedMesh {
   std::vector<std::string> left_out;  // one line each: what of the file is not here
 };
 
-// The names in quotation marks with commas between them; from some 200 bytes on dots follow.
+// The names in quotation marks with commas between them, as as_name() has them; from some 200 bytes
+// on dots follow.
 std::string list_of(const std::vector<std::string>& names);
 
 // `name` starts each error, usually the file's path.

@@ -17,6 +17,8 @@
 namespace trocar::organ {
 
 inline constexpr std::size_t kMaxRegions = 1000;
+// A name that an organ or a region is given has 1 to so many bytes of printable UTF-8.
+inline constexpr std::size_t kMostNameBytes = 200;
 
 struct Organ {
   std::string name;    // "liver" or another built-in one's, or the file's stem
