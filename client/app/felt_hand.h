@@ -69,6 +69,10 @@ class FeltHand {
     std::uint64_t ns = 0;
   };
   std::optional<Sent> pop_sent() { return sent_places_.try_pop(); }
+  // Begins to end the loop.
+  void let_go() {
+    if (loop_) loop_->let_go();
+  }
   // Ends the loop; no force is left. Then the trace may be read; null: there is none.
   const haptics::Trace* stop();
 

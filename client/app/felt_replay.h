@@ -20,6 +20,8 @@ class FeltReplay {
   // Says where the recording is now. An error: the device is gone.
   Status update(const replica::PlaybackControl& playback, std::uint64_t now_ns);
   const FeltFigures& figures();
+  // Begins to end the loop.
+  void let_go() { loop_.let_go(); }
   // Ends the loop; no force is left. Then the trace may be read; null: there is none.
   const haptics::Trace* stop();
 

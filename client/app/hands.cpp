@@ -157,6 +157,9 @@ std::vector<FeltFigures> Hands::figures() const {
 }
 
 std::vector<const haptics::Trace*> Hands::let_go() {
+  // All at once, as each takes a while.
+  for (auto& hand : felt_) hand->let_go();
+  for (auto& hand : replayed_) hand->let_go();
   std::vector<const haptics::Trace*> traces;
   for (auto& hand : felt_) traces.push_back(hand->stop());
   for (auto& hand : replayed_) traces.push_back(hand->stop());

@@ -85,7 +85,7 @@ void Hand::feel(const device::DeviceReading& reading, std::uint64_t now_us) {
   sent.time_us = now_us;
   readings_.put(sent);
   touch_ = model_.step({sent.tip_m, sent.orientation, sent.verb, now_us});
-  if (sent.verb == tool::Verb::None) touch_ = {};
+  if (sent.verb == tool::Verb::None || lets_go_) touch_ = {};
 }
 
 Status Hand::step(std::uint64_t now_us) {
@@ -136,7 +136,13 @@ Status Hand::step(std::uint64_t now_us) {
   return written;
 }
 
+bool Hand::let_go() {
+  lets_go_ = true;
+  return state_.hand_force_n == Vec3d{} && state_.hand_torque_nm == Vec3d{};
+}
+
 void Hand::stop() {
+  lets_go_ = false;
   static_cast<void>(device_.write({}, {}));
 }
 

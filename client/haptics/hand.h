@@ -82,6 +82,7 @@ class Hand final : public Stepped {
   bool take_report(HandState& state) { return reports_.take(state); }
 
   Status step(std::uint64_t now_us) override;
+  bool let_go() override;
   void stop() override;
 
  private:
@@ -108,6 +109,7 @@ class Hand final : public Stepped {
   HandState state_;
   TouchOutput touch_;
   bool is_closed_ = false;                    // the gripper
+  bool lets_go_ = false;                      // until it is stopped
   std::uint64_t last_us_ = 0, patch_us_ = 0;  // 0: there was none
 };
 

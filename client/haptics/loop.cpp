@@ -42,7 +42,7 @@ Loop::Granted Loop::start() {
 }
 
 void Loop::stop() {
-  must_stop_ = true;
+  let_go();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -66,7 +66,8 @@ void Loop::run() noexcept {
   const auto period_ns = static_cast<std::uint64_t>(1e9 / settings_.rate_hz);
   std::uint64_t next_ns = monotonic_ns() + period_ns;
   published_ns_ = monotonic_ns();
-  while (!must_stop_.load(std::memory_order_relaxed)) {
+  int last_steps = static_cast<int>(kLetGo_ms * settings_.rate_hz / 1000);
+  while (!must_stop_.load(std::memory_order_relaxed) || (!hand_.let_go() && last_steps-- > 0)) {
     sleep_until(next_ns);
     const std::uint64_t woke_ns = monotonic_ns();
     late_.add(static_cast<double>(woke_ns - next_ns) * 1e-3);

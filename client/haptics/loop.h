@@ -4,7 +4,8 @@
 // the monotonic clock. A step that ends after the next one should have begun is an overrun; what
 // was missed is left out.
 //
-// However the loop ends, the last thing that it writes to the device is no force.
+// However the loop ends, the last thing that it writes to the device is no force. One that is
+// stopped goes on until its hand has let go, for at most kLetGo_ms.
 
 #include <atomic>
 #include <cstdint>
@@ -32,6 +33,8 @@ struct LoopTiming {
 
 class Loop {
  public:
+  static constexpr int kLetGo_ms = 80;  // 20 N, more than any device renders, take 67
+
   // Says what the system granted.
   struct Granted {
     bool has_priority = false;       // SCHED_FIFO
@@ -44,7 +47,9 @@ class Loop {
   Loop& operator=(const Loop&) = delete;
 
   Granted start();
-  // Waits for the step that is under way.
+  // Returns at once: the hand lets go, then the loop ends.
+  void let_go() { must_stop_ = true; }
+  // Does the same, and waits for the end.
   void stop();
   // False: it was stopped, or the device is gone.
   bool is_running() const { return is_running_.load(std::memory_order_acquire); }

@@ -83,6 +83,7 @@ Status PlaybackHand::step(std::uint64_t now_us) {
     state_.reading.tip_m = tip.position_m;
   }
 
+  if (lets_go_) share_ = 0;
   SafetyInput input;
   input.force_n = force_n_ * share_;
   input.torque_nm = torque_nm_ * share_;
@@ -113,7 +114,13 @@ Status PlaybackHand::step(std::uint64_t now_us) {
   return written;
 }
 
+bool PlaybackHand::let_go() {
+  lets_go_ = true;
+  return state_.hand_force_n == Vec3d{} && state_.hand_torque_nm == Vec3d{};
+}
+
 void PlaybackHand::stop() {
+  lets_go_ = false;
   static_cast<void>(device_.write({}, {}));
 }
 

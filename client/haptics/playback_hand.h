@@ -47,6 +47,7 @@ class PlaybackHand final : public Stepped {
   bool take_state(HandState& state) { return states_.take(state); }
 
   Status step(std::uint64_t now_us) override;
+  bool let_go() override;
   void stop() override;
 
  private:
@@ -70,6 +71,7 @@ class PlaybackHand final : public Stepped {
   Vec3d last_m_, velocity_m_s_;
   std::uint64_t last_us_ = 0;  // 0: there was none
   bool has_jumped_ = true;
+  bool lets_go_ = false;  // until it is stopped
   HandState state_;
 };
 

@@ -13,7 +13,10 @@ class Stepped {
   virtual ~Stepped() = default;
   // An error: the device is gone.
   virtual Status step(std::uint64_t now_us) = 0;
-  // Writes no force; the device may be gone.
+  // Takes the force away in the steps from now on, no faster than a hand bears. Returns whether
+  // none is left.
+  virtual bool let_go() = 0;
+  // Writes no force at once; the device may be gone.
   virtual void stop() = 0;
 };
 

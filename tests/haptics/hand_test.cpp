@@ -359,6 +359,36 @@ TEST(Loop, StepsMeasuresAndEndsWithoutForce) {
   EXPECT_GE(timing.late_worst_us, 0.9 * timing.late_99_us) << "its bin is 9 % wide";
 }
 
+// A hand that leans on tissue when the program ends would else be thrown forward.
+TEST(Loop, AnEndTakesTheForceAwayNoFasterThanAHandBears) {
+  class Recorder : public LiveDevice {
+   public:
+    Status write(const Vec3d& force_n, const Vec3d& torque_nm) override {
+      const double step_n = length(force_n - last_force_n);
+      largest_n = std::max(largest_n, length(force_n));
+      largest_step_n = std::max(largest_step_n, step_n);
+      return LiveDevice::write(force_n, torque_nm);
+    }
+    double largest_n = 0, largest_step_n = 0;
+  };
+  Recorder device;
+  HandSettings firm = settings();
+  firm.scale.force = 10;
+  Hand hand(device, firm);
+  put_surface(hand);
+  Loop loop(hand, {.wants_real_time = false});
+  loop.start();
+  wait_until([&] {
+    put_surface(hand);  // somebody answers
+    return device.reads >= 500;
+  });
+  loop.stop();
+  EXPECT_GT(device.largest_n, 1);
+  // A step that is late may change the force by twice as much.
+  EXPECT_LE(device.largest_step_n, 0.6 + 1e-9);
+  EXPECT_EQ(length(device.last_force_n), 0);
+}
+
 TEST(Loop, RealTimeIsAskedForAndMayBeRefused) {
   LiveDevice device;
   Hand hand(device, settings());

@@ -66,6 +66,18 @@ TEST_F(Playback, TheForceOfTheMomentIsFelt) {
   EXPECT_LE(largest_step_n_, 0.01) << "it begins little by little";
 }
 
+TEST_F(Playback, AnEndTakesTheForceAwayNoFasterThanAHandBears) {
+  tick_ = 5000;
+  run(1000);
+  ASSERT_GT(length(device_.last_force_n), 0.5);
+  EXPECT_FALSE(hand_.let_go());
+  largest_step_n_ = 0;
+  for (int k = 0; k < 10 && !hand_.let_go(); ++k) run(1);
+  EXPECT_TRUE(hand_.let_go());
+  EXPECT_LE(largest_step_n_, 0.3 + 1e-9);
+  expect_nothing();
+}
+
 TEST_F(Playback, NothingIsFeltWhileItStandsOrPlaysAtAnotherSpeed) {
   run(1000);
   is_playing_ = false;
