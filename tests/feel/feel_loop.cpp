@@ -107,7 +107,13 @@ FeelRecord run(const step::Simulation& simulation, const tool::ToolShape& shape,
     if (const ToolReading* newest = up.deliver(s)) waiting = newest;
     if (k % pause == 0) {
       if (felt.others) felt.others(s, server.others());
-      server.tick(waiting);
+      if (felt.decides) {
+        auto decisions = felt.decisions;
+        felt.decides(s, decisions);
+        server.decide(decisions);
+      }
+      const auto given = [&](const hands::ToolInput& wanted) { return felt.given(s, wanted); };
+      server.tick(waiting, felt.given ? Given(given) : nullptr);
       waiting = nullptr;
     }
     if (felt.others) felt.others(s, truth.others());

@@ -25,10 +25,14 @@ struct FeltMotion {
   std::function<tool::Verb(double s)> verb = {};  // none: the tool pushes
   // Says what others do, in the truth as well.
   std::function<void(double s, hands::TickInputs&)> others = {};
+  // Says what the server's session makes of this hand's readings; none: it takes them as they are.
+  std::function<std::optional<hands::ToolInput>(double s, const hands::ToolInput&)> given = {};
   double gone_s = -1, back_s = -1;  // between them nothing passes the line
   double server_pace = 1;           // simulated time over real time; 1 / a whole number
   // The server's ticks are decided so.
   step::TickDecisions decisions = {};
+  // Changes them in each tick, at the server alone.
+  std::function<void(double s, step::TickDecisions&)> decides = {};
 };
 
 struct FeelRecord : Record {

@@ -22,10 +22,11 @@ const hands::Tool& FeltOrgan::tool() const {
   return simulation_.state().tools[kTool];
 }
 
-void FeltOrgan::tick(const ToolReading* reading) {
+void FeltOrgan::tick(const ToolReading* reading, const Given& given) {
   if (reading) {
     const tool::ToolSample sample{{to_float(reading->tip_m), reading->orientation}, reading->verb};
-    inputs_.samples.push_back({kTool, sample, reading->time_us});
+    const hands::ToolInput wanted{kTool, sample, reading->time_us};
+    if (const auto input = given ? given(wanted) : wanted) inputs_.samples.push_back(*input);
   }
   simulation_.tick(inputs_, decisions_);
   inputs_.clear();

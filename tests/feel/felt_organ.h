@@ -2,6 +2,7 @@
 
 // An organ as the first hand's tool feels it: a server's simulation without a network around it.
 
+#include <functional>
 #include <optional>
 
 #include "common/math/frame.h"
@@ -17,6 +18,10 @@ struct ToolReading {
   std::uint64_t time_us = 0;
 };
 
+// Says what the server's session makes of a reading before its simulation sees it; nothing: it
+// takes none.
+using Given = std::function<std::optional<hands::ToolInput>(const hands::ToolInput& wanted)>;
+
 class FeltOrgan {
  public:
   // Another one of `simulation`, at its beginning; tools of that shape.
@@ -27,7 +32,8 @@ class FeltOrgan {
   // From the next tick on; those of a server with much time are the default.
   void decide(const step::TickDecisions& decisions) { decisions_ = decisions; }
   // Simulates a tick. The tool goes to the reading as a session's tools do; null: none has come.
-  void tick(const ToolReading* reading);
+  // given: null: the simulation takes the reading as it is.
+  void tick(const ToolReading* reading, const Given& given = nullptr);
   // The tool is at the reading in this tick already.
   void tick_at(const ToolReading& reading);
 
