@@ -56,7 +56,7 @@ mesh::NamedNodes region_of(const Filled& filled, std::uint16_t label, const std:
                           filled.mesh.tets[t].end());
     }
   std::ranges::sort(region.nodes);
-  region.nodes.erase(std::ranges::unique(region.nodes).begin(), region.nodes.end());
+  region.nodes.erase(std::unique(region.nodes.begin(), region.nodes.end()), region.nodes.end());
   return region;
 }
 
