@@ -18,8 +18,7 @@ using testing::HeightField;
 constexpr std::int64_t kMillilitrePl = 1'000'000'000;
 
 struct Pour {
-  explicit Pour(const HeightField& field)
-      : field_(field), places_(field.layout, field.displacements) {
+  explicit Pour(const HeightField& field) : places_(field.layout, field.displacements) {
     graph_.rebuild(field.layout);
     blood.resize(field.layout.vertex_count());
     is_wet_.resize(field.layout.vertex_count(), 0);
@@ -57,7 +56,6 @@ struct Pour {
   SurfaceGraph graph_;
 
  private:
-  const HeightField& field_;
   SurfacePlaces places_;
   std::vector<std::uint8_t> is_wet_;
   Film film_;
