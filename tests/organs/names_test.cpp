@@ -8,6 +8,7 @@
 #include "common/base/printable.h"
 #include "server/organs/catalogue/import_organ.h"
 #include "server/organs/organ/organ_file.h"
+#include "tests/organs/two_halves.h"
 #include "tests/support/files.h"
 
 namespace trocar::catalogue {
@@ -113,14 +114,7 @@ TEST(Names, ThatBecomeTheSameAreTold) {
 }
 
 TEST(Names, OfLabelsAreKeptAndFoundOrSaid) {
-  label_map::LabelMap map;
-  map.size = {24, 24, 24};
-  map.labels.resize(24 * 24 * 24);
-  for (int k = 2; k < 22; ++k)
-    for (int j = 2; j < 22; ++j)
-      for (int i = 2; i < 22; ++i) map.labels[map.index(i, j, k)] = j < 12 ? 4 : 7;
-  ASSERT_TRUE(
-      set_place({}, {Vec3d{0.003, 0, 0}, Vec3d{0, 0.003, 0}, Vec3d{0, 0, 0.003}}, map).ok());
+  auto map = testing::two_halves();
   map.names = {{4, kLatinName}, {7, kLiverName}};
   ImportOptions options;
   options.nodes = 300;

@@ -234,8 +234,7 @@ TEST(Rest, TissueBesideAWoundIsSweptMoreOnceTheBladeHasLeft) {
     (tick < kRests ? cutting : resting) = report.solve.far_node_sweeps - others;
   }
   EXPECT_GT(cutting, 10u);
-  // One sweep more than others have, then three; some nodes are swept as near ones.
-  EXPECT_GT(resting, 2 * cutting);
+  EXPECT_EQ(resting, 3 * cutting) << "four sweeps, of which others have one, against two";
 }
 
 // The work of a press, of the whole organ that moves with it.
