@@ -51,7 +51,7 @@ Shares shares_of(const LabelSolid& solid, const mesh::TetMesh& mesh) {
   return shares;
 }
 
-// What one label still lacks at each tet, m^3.
+// The volume that one label still lacks at each tet, m^3.
 class Demand {
  public:
   Demand(const mesh::TetMesh& mesh, const Shares& shares, std::uint16_t label)
