@@ -8,14 +8,13 @@
 #include "server/lab/scenario/relaxed_organ.h"
 #include "server/tissue/contact/update_claims.h"
 #include "server/tissue/dynamics/relaxation.h"
+#include "server/tissue/hands/sampling.h"
 
 namespace trocar::scenario {
 namespace {
 
 using scenario::kAllAxes;
 
-// A hand reads its devices this often, in a session as here.
-constexpr Tick kSampleTicks = 8;
 // With a step of time this long inertia and damping are nothing, so that a step ends in
 // equilibrium.
 constexpr float kStaticStep_s = 100;
@@ -257,7 +256,7 @@ void ScenarioRun::sample_tools(Tick tick, double time_s, bool has_samples) {
 StepReport ScenarioRun::step_dynamic() {
   if (explicit_) return step_explicit();
   const Tick before = simulation_.current_tick();
-  sample_tools(before + 1, seconds_of(before), before % kSampleTicks == 0);
+  sample_tools(before + 1, seconds_of(before), hands::takes_samples(before + 1));
   const auto& tick = simulation_.tick(inputs_, decisions_);
   StepReport report;
   report.active_nodes = tick.near.active_nodes;
