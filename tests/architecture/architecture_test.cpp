@@ -15,7 +15,6 @@ namespace {
 // These shrink, and nothing is added.
 constexpr LargeClass kLargeClasses[] = {
     {"client/app", "ClientOptions", 53, "has a field for each option, and no rule between them"},
-    {"client/app", "Picture", 59, "one window, one recording beside it"},
     {"client/embedding", "EmbeddedSurface", 68, "arrays per fine vertex that one pass writes"},
     {"client/haptics", "TouchModel", 80, "one state that each answer corrects"},
     {"client/net", "NetSource::Session", 118, "a connection, its return and its figures"},
@@ -35,7 +34,7 @@ constexpr LargeClass kLargeClasses[] = {
     {"server/web/bridge", "Seat", 53, "a browser's place and its pace"},
     {"server/web/bridge", "SessionCopy", 52, "each message of a session has a method"},
 };
-constexpr std::size_t kLongFunctions = 40, kWideFunctions = 15;
+constexpr std::size_t kLongFunctions = 39, kWideFunctions = 15;
 
 const SourceTree& tree() {
   static const SourceTree kTree = read_source_tree(TROCAR_SOURCE_DIR);
