@@ -17,12 +17,15 @@
 //
 // Metres, newtons, seconds, world frame. No step or take allocates; one thread.
 
-#include <array>
 #include <optional>
 
+#include "client/haptics/believed_surface.h"
 #include "client/haptics/blade_element.h"
+#include "client/haptics/correction.h"
 #include "client/haptics/grip_element.h"
+#include "client/haptics/jaws.h"
 #include "client/haptics/local_events.h"
+#include "client/haptics/met_materials.h"
 #include "client/haptics/past_states.h"
 #include "client/haptics/power_law.h"
 #include "client/haptics/push_element.h"
@@ -66,33 +69,19 @@ class TouchModel {
  public:
   explicit TouchModel(const tool::ToolShape& shape, const TouchSettings& settings = {});
 
-  // Patches may refer to the law from now on; a new one may take an old one's number. More than
-  // kLaws: the oldest goes.
+  // Patches may refer to the law from now on (met_materials.h).
   void take(const wire::HapticLaw& law);
   // Belongs between two steps.
   void take(const wire::HapticPatch& patch);
   TouchOutput step(const TouchInput& input);
 
   const TouchCounts& counts() const { return counts_; }
-  double slope() const { return slope_; }
+  double slope() const { return correction_.slope; }
   // From a pose to the answer that belongs to it, smoothed.
   double answer_s() const { return answer_s_; }
   const wire::HapticPatch& newest_patch() const { return patch_; }
 
  private:
-  static constexpr std::size_t kLaws = 8;
-
-  static constexpr double kNoLimit_n = 1e9;
-
-  // A material that was met, and what was learned about it.
-  struct Material {
-    wire::HapticLaw law;
-    bool is_known = false;
-    double slope = 1;
-    double expected_slope = 1;  // by what the server said of the place before it was touched
-    bool is_felt = false;       // since then
-  };
-
   static bool touches(wire::TouchKind kind) {
     return kind == wire::TouchKind::Push || kind == wire::TouchKind::Grip ||
            kind == wire::TouchKind::Cut;
@@ -108,7 +97,6 @@ class TouchModel {
   // The local model.
   PastState state_of(const TouchInput& input) const;
   void answer(PastState& state, double dt_s);
-  double depth_of(const Vec3d& core_m, double clearance_m) const;
   Vec3d model_force(const Response& response) const;
   // s M, in use, or as the fit has it.
   Vec3d scaled_force(const Response& response, double slope, const Vec3d& lean) const;
@@ -116,7 +104,6 @@ class TouchModel {
 
   // A step makes a force of it.
   void blend(double dt_s);
-  void watch_jaws(const TouchInput& input, double dt_s);
   Vec3d corrected_force(const Response& response) const;
   Vec3d limited_force(const Vec3d& force_n, const Response& response) const;
   Vec3d stopped_force(const Vec3d& force_n, const Vec3d& core_m, double dt_s);
@@ -124,7 +111,6 @@ class TouchModel {
   // A patch changes it.
   bool is_old(const wire::HapticPatch& patch) const;
   void take_surface(bool had_surface, bool gripped);
-  bool take_law();
   void take_stop();
   void restart(std::size_t first);
   void correct(const PastState& then, bool is_new_structure);
@@ -140,17 +126,14 @@ class TouchModel {
 
   tool::ToolShape shape_;
   TouchSettings settings_;
-  std::array<Material, kLaws + 1> materials_;  // the last one stands in for a law that has not come
-  std::size_t material_ = kLaws, next_material_ = 0;
+  MetMaterials materials_;
   PowerLaw power_law_;
   ViscoSteps steps_;
   double slow_share_ = 1;  // stiffness of 50 ms over the elastic one
 
   wire::HapticPatch patch_;
   bool has_patch_ = false;
-  Vec3d normal_{0, 0, 1}, plane_m_, grip_point_m_;
-  double depth_offset_m_ = 0;  // of the believed surface over the newest one; fades
-  Vec3d grip_offset_m_;        // likewise
+  BelievedSurface surface_;
 
   PushElement push_;
   GripElement grip_;
@@ -160,20 +143,12 @@ class TouchModel {
 
   SlopeFit fit_;
   std::uint64_t last_echo_us_ = 0;
-  double slope_ = 1;                        // in use, behind the fit's
-  Vec3d lean_;                              // likewise
-  Vec3d correction_n_, next_correction_n_;  // in use, and where it goes
-  double gate_force_n_ = 0.02;              // at the echo
-  double pressed_limit_n_ = kNoLimit_n;     // along the normal
-  Vec3d lever_m_, next_lever_m_;            // torque over the size of the force
-  double side_friction_n_m_ = 0;            // of a blade, per length of its edge in tissue
+  Correction correction_;
+  double side_friction_n_m_ = 0;  // of a blade, per length of its edge in tissue
   double answer_s_ = 0;
 
   LocalStop stop_;
-  bool is_let_go_ = false;  // the jaws opened, the server does not know yet
-  std::uint64_t jaws_closed_us_ = 0;
-  double held_share_ = 1;
-  tool::Verb verb_ = tool::Verb::None;
+  Jaws jaws_;
   TouchOutput output_;
   TouchCounts counts_;
 };

@@ -28,16 +28,6 @@ SymMat3<double> scaled(const SymMat3<double>& a, double s) {
   return {a.xx * s, a.xy * s, a.xz * s, a.yy * s, a.yz * s, a.zz * s};
 }
 
-bool is_same(const wire::HapticLaw& a, const wire::HapticLaw& b) {
-  const auto is_same_term = [](const wire::HapticLaw::Term& c, const wire::HapticLaw::Term& d) {
-    return c.share == d.share && c.time_s == d.time_s;
-  };
-  return a.exponent == b.exponent && a.youngs_modulus_pa == b.youngs_modulus_pa &&
-         a.poisson_ratio == b.poisson_ratio &&
-         std::ranges::equal(a.relaxation, b.relaxation, is_same_term) &&
-         std::ranges::equal(a.fast, b.fast, is_same_term);
-}
-
 // The stiffness along a direction, which need not be of unit length.
 double along(const SymMat3<double>& stiffness, const Vec3d& direction) {
   return dot(direction, stiffness * direction) / length_squared(direction);
@@ -46,19 +36,9 @@ double along(const SymMat3<double>& stiffness, const Vec3d& direction) {
 }  // namespace
 
 void TouchModel::take(const wire::HapticLaw& law) {
-  for (std::size_t i = 0; i < kLaws; ++i) {
-    Material& material = materials_[i];
-    if (!material.is_known || material.law.number != law.number) continue;
-    if (is_same(material.law, law)) return;
-    material = {law, true, 1};
-    if (i != material_) return;
-    use_material();
-    restart(past_.end());
-    return;
-  }
-  if (next_material_ == material_) next_material_ = (next_material_ + 1) % kLaws;
-  materials_[next_material_] = {law, true, 1};
-  next_material_ = (next_material_ + 1) % kLaws;
+  if (!materials_.take(law)) return;
+  use_material();
+  restart(past_.end());
 }
 
 bool TouchModel::is_old(const wire::HapticPatch& patch) const {
@@ -78,11 +58,10 @@ void TouchModel::take(const wire::HapticPatch& patch) {
   patch_ = patch;
   has_patch_ = true;
   take_surface(had_surface, gripped);
-  const bool is_new_law = take_law();
+  const bool is_new_law = materials_.use(patch_.law);
+  if (is_new_law) use_material();
   take_stop();
-  if (is_let_go_ &&
-      (!grips() || (verb_ == tool::Verb::Grasp && patch.echo_time_us > jaws_closed_us_)))
-    is_let_go_ = false;
+  jaws_.take(grips(), patch.echo_time_us);
 
   const auto found = past_.find(patch.echo_time_us);
   if (!found) {
@@ -107,34 +86,22 @@ void TouchModel::take(const wire::HapticPatch& patch) {
 void TouchModel::take_surface(bool had_surface, bool gripped) {
   if (!has_surface()) return;
   const PastState last = past_.is_empty() ? PastState{} : past_[past_.end() - 1];
-  const double believed_m = depth_of(last.core_m, last.clearance_m) + depth_offset_m_;
-  normal_ = normalized(trocar::to_double(patch_.plane_normal), normal_);
-  plane_m_ = trocar::to_double(patch_.plane_point_m);
-  const double newest_m = depth_of(last.core_m, last.clearance_m);
+  const double believed_m = surface_.believed_depth_of(last.core_m, last.clearance_m);
+  surface_.normal = normalized(trocar::to_double(patch_.plane_normal), surface_.normal);
+  surface_.plane_m = trocar::to_double(patch_.plane_point_m);
+  const double newest_m = surface_.depth_of(last.core_m, last.clearance_m);
   const bool is_far = !output_.touches && newest_m < kClearlyAbove_m;
-  depth_offset_m_ = had_surface && !is_far ? believed_m - newest_m : 0;
+  surface_.depth_offset_m = had_surface && !is_far ? believed_m - newest_m : 0;
 
   if (!grips()) return;
-  const Vec3d believed_grip_m = grip_point_m_ + grip_offset_m_;
-  grip_point_m_ = trocar::to_double(patch_.grip_point_m);
-  grip_offset_m_ = gripped ? believed_grip_m - grip_point_m_ : Vec3d{};
+  const Vec3d believed_grip_m = surface_.believed_grip_m();
+  surface_.grip_point_m = trocar::to_double(patch_.grip_point_m);
+  surface_.grip_offset_m = gripped ? believed_grip_m - surface_.grip_point_m : Vec3d{};
   if (gripped && patch_.has_stiffness) grip_.set_stiffness(grip_stiffness());
 }
 
-bool TouchModel::take_law() {
-  if (materials_[material_].is_known && materials_[material_].law.number == patch_.law)
-    return false;
-  for (std::size_t i = 0; i < kLaws; ++i) {
-    if (!materials_[i].is_known || materials_[i].law.number != patch_.law) continue;
-    material_ = i;
-    use_material();
-    return true;
-  }
-  return false;  // its law has not come yet
-}
-
 void TouchModel::use_material() {
-  const Material& material = materials_[material_];
+  const auto& material = materials_.now();
   power_law_ = first_guess(material.law, static_cast<double>(shape_.radius_m));
   slow_share_ = relaxed_share(material.law, kSlow_s);
   steps_ = {};
@@ -145,8 +112,9 @@ void TouchModel::take_stop() {
   if (past_.is_empty() || is_refused == stop_.is_on()) return;
   const PastState& last = past_[past_.end() - 1];
   if (is_refused) {
-    stop_.begin(last.core_m, normal_, depth_of(last.core_m, last.clearance_m) + depth_offset_m_,
-                std::max(0.0, dot(output_.force_n, normal_)), settings_.stop_n_m);
+    stop_.begin(last.core_m, surface_.normal,
+                surface_.believed_depth_of(last.core_m, last.clearance_m),
+                std::max(0.0, dot(output_.force_n, surface_.normal)), settings_.stop_n_m);
   } else {
     stop_.end();
     keep_force(last.response);
@@ -155,7 +123,7 @@ void TouchModel::take_stop() {
 
 // Chooses the correction so that the force goes on as it is.
 void TouchModel::keep_force(const Response& response) {
-  correction_n_ = output_.force_n - scaled_force(response, slope_, lean_);
+  correction_.n = output_.force_n - scaled_force(response, correction_.slope, correction_.lean);
 }
 
 SymMat3<double> TouchModel::grip_stiffness() const {
@@ -163,17 +131,17 @@ SymMat3<double> TouchModel::grip_stiffness() const {
   const double k = power_law_.stiffness_n_m(kGuessDepth_m);
   SymMat3<double> stiffness;
   stiffness.add_identity(kAcrossOverNormal * k);
-  stiffness.add_outer(normal_, (1 - kAcrossOverNormal) * k);
+  stiffness.add_outer(surface_.normal, (1 - kAcrossOverNormal) * k);
   return stiffness;
 }
 
 // The local model begins anew with what it is now, at the pose that the answer belongs to.
 void TouchModel::restart(std::size_t first) {
   if (grips()) grip_.start(grip_stiffness());
-  fit_.set_slope(grips() || cuts() ? 1 : materials_[material_].slope);
+  fit_.set_slope(grips() || cuts() ? 1 : materials_.now().slope);
   fit_.clear_sums();
-  slope_ = fit_.slope();
-  lean_ = fit_.lean();
+  correction_.slope = fit_.slope();
+  correction_.lean = fit_.lean();
   push_.start(kClearlyAbove_m);
   if (past_.is_empty()) return;
   const std::size_t answered = first;
@@ -183,7 +151,7 @@ void TouchModel::restart(std::size_t first) {
                     past_.end() > kMostReplayed ? past_.end() - kMostReplayed : std::size_t{0}});
   first = std::min(first, past_.end() - 1);
   blade_.start(past_[first].tip_m);
-  if (has_surface()) push_.start(depth_of(past_[first].core_m, past_[first].clearance_m));
+  if (has_surface()) push_.start(surface_.depth_of(past_[first].core_m, past_[first].clearance_m));
   for (std::size_t i = first; i < past_.end(); ++i) {
     const bool has_previous = i > past_.begin();
     const std::uint64_t dt_us = has_previous ? past_[i].time_us - past_[i - 1].time_us : 1000;
@@ -192,14 +160,15 @@ void TouchModel::restart(std::size_t first) {
   const PastState& then_state = past_[std::clamp(answered, first, past_.end() - 1)];
   if (cuts()) {
     fit_.set_slope(blade_slope(then_state.response));
-    slope_ = fit_.slope();
+    correction_.slope = fit_.slope();
     take_side_friction(then_state.response);
   }
   const Response& then = then_state.response;
-  next_correction_n_ = {};
+  correction_.next_n = {};
   if (touches(patch_.kind))
-    next_correction_n_ = trocar::to_double(patch_.force_n) - scaled_force(then, slope_, lean_);
-  gate_force_n_ = std::max(kLeastGateForce_n, then.elastic_n);
+    correction_.next_n =
+        trocar::to_double(patch_.force_n) - scaled_force(then, correction_.slope, correction_.lean);
+  correction_.gate_force_n = std::max(kLeastGateForce_n, then.elastic_n);
   keep_force(past_[past_.end() - 1].response);
 }
 
@@ -209,13 +178,13 @@ Response TouchModel::with_moved_reference(const PastState& then) const {
   Response response = then.response;
   const double share = settings_.moved_share * slow_share_;
   if (grips()) {
-    const Vec3d moved_m = grip_point_m_ - then.grip_point_m;
+    const Vec3d moved_m = surface_.grip_point_m - then.grip_point_m;
     response.rest_n += grip_.stiffness() * moved_m * share;
   } else if (response.elastic_n > 0) {
-    const double deeper_m = depth_of(then.core_m, then.clearance_m) - then.depth_m;
+    const double deeper_m = surface_.depth_of(then.core_m, then.clearance_m) - then.depth_m;
     response.normal_n += response.stiffness_n_m * deeper_m * share;
     response.elastic_n = std::max(0.0, response.elastic_n + response.stiffness_n_m * deeper_m);
-    response.rest_n = response.rest_n - normal_ * dot(response.rest_n, normal_);
+    response.rest_n = response.rest_n - surface_.normal * dot(response.rest_n, surface_.normal);
   }
   return response;
 }
@@ -245,15 +214,15 @@ void TouchModel::correct_blade(const PastState& then) {
   const double slope = fit_.slope();
   fit_.set_slope(slope +
                  (blade_slope(then.response) - slope) * std::min(1.0, dt_s / kBladeFollow_s));
-  next_correction_n_ =
+  correction_.next_n =
       trocar::to_double(patch_.force_n) - scaled_force(then.response, fit_.slope(), {});
-  gate_force_n_ = std::max(kLeastGateForce_n, then.response.elastic_n);
+  correction_.gate_force_n = std::max(kLeastGateForce_n, then.response.elastic_n);
   take_lever();
 }
 
 void TouchModel::take_lever() {
   if (const float force_n = length(patch_.force_n); force_n > kLeastGateForce_n)
-    next_lever_m_ = trocar::to_double(patch_.torque_nm) / static_cast<double>(force_n);
+    correction_.next_lever_m = trocar::to_double(patch_.torque_nm) / static_cast<double>(force_n);
 }
 
 void TouchModel::correct(const PastState& then, bool is_new_structure) {
@@ -262,19 +231,19 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
   const bool touched = touches(patch_.kind);
   const Response response = with_moved_reference(then);
   if (!touched && response.elastic_n <= 0) {
-    next_correction_n_ = {};
+    correction_.next_n = {};
     expect();
     return;
   }
   const Vec3d server_n = touched ? trocar::to_double(patch_.force_n) : Vec3d{};
   const Vec3d local_n = model_force(response);
   // A tool that is stopped says nothing of the tissue below it.
-  const double believed_n = dot(local_n * fit_.slope() + next_correction_n_, normal_);
+  const double believed_n = dot(local_n * fit_.slope() + correction_.next_n, surface_.normal);
   if (!is_new_structure && patch_.pressed_limit_n > 0 &&
       believed_n > static_cast<double>(patch_.pressed_limit_n))
     return;
   // The slope of a push is that along the normal; friction follows.
-  const Vec3d fit_server_n = grips() ? server_n : Vec3d{dot(server_n, normal_), 0, 0};
+  const Vec3d fit_server_n = grips() ? server_n : Vec3d{dot(server_n, surface_.normal), 0, 0};
   const Vec3d fit_local_n = grips() ? local_n : Vec3d{response.normal_n, 0, 0};
   if (is_new_structure) {
     fit_.restart(fit_server_n, fit_local_n);
@@ -284,15 +253,15 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
     fit_.add(fit_server_n, fit_local_n, dt_s, stiffness_ratio(response));
     if (!grips()) {
       const Vec3d rest_n = server_n - response.rest_n * fit_.slope();
-      fit_.add_lean(rest_n - normal_ * dot(rest_n, normal_), response.normal_n);
+      fit_.add_lean(rest_n - surface_.normal * dot(rest_n, surface_.normal), response.normal_n);
     }
   }
   if (!grips()) {
-    materials_[material_].slope = fit_.slope();
-    if (touched) materials_[material_].is_felt = true;
+    materials_.now().slope = fit_.slope();
+    if (touched) materials_.now().is_felt = true;
   }
-  next_correction_n_ = server_n - scaled_force(response, fit_.slope(), fit_.lean());
-  gate_force_n_ = std::max(kLeastGateForce_n, response.elastic_n);
+  correction_.next_n = server_n - scaled_force(response, fit_.slope(), fit_.lean());
+  correction_.gate_force_n = std::max(kLeastGateForce_n, response.elastic_n);
   take_lever();
 }
 
@@ -300,10 +269,11 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
 // A slope that was felt elsewhere is scaled by how much stiffer this place should be than that one.
 void TouchModel::expect() {
   if (patch_.kind != wire::TouchKind::Near || !patch_.has_stiffness) return;
-  Material& material = materials_[material_];
+  auto& material = materials_.now();
   const double local_n_m = power_law_.stiffness_n_m(kGuessDepth_m) * slow_share_;
-  const double expected = std::clamp(along(to_double(patch_.stiffness_n_m), normal_) / local_n_m,
-                                     SlopeFit::kLeast, SlopeFit::kMost);
+  const double expected =
+      std::clamp(along(to_double(patch_.stiffness_n_m), surface_.normal) / local_n_m,
+                 SlopeFit::kLeast, SlopeFit::kMost);
   if (!material.is_felt) material.slope *= expected / material.expected_slope;
   material.expected_slope = expected;
   material.is_felt = false;
@@ -312,7 +282,7 @@ void TouchModel::expect() {
 
 std::optional<double> TouchModel::stiffness_ratio(const Response& response) const {
   if (!patch_.has_stiffness) return std::nullopt;
-  const Vec3d direction = grips() ? model_force(response) : normal_;
+  const Vec3d direction = grips() ? model_force(response) : surface_.normal;
   if (length(direction) < SlopeFit::kLeastForce_n) return std::nullopt;
   const double server_n_m = along(to_double(patch_.stiffness_n_m), direction);
   const double local_n_m = grips() ? along(grip_.stiffness(), direction) : response.stiffness_n_m;

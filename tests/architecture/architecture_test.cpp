@@ -16,7 +16,7 @@ namespace {
 constexpr LargeClass kLargeClasses[] = {
     {"client/app", "ClientOptions", 53, "has a field for each option, and no rule between them"},
     {"client/embedding", "EmbeddedSurface", 68, "arrays per fine vertex that one pass writes"},
-    {"client/haptics", "TouchModel", 80, "one state that each answer corrects"},
+    {"client/haptics", "TouchModel", 59, "one state that each answer corrects"},
     {"client/net", "NetSource::Session", 118, "a connection, its return and its figures"},
     {"client/replay", "ReplaySource", 63, "two interfaces, that of a source and that of a player"},
     {"client/replica", "Replica", 115, "each message has a method, and most of them a member"},
