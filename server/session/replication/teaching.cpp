@@ -1,5 +1,4 @@
-// The replicator's part about what an instructor does with the organ as a whole, with people and
-// with their tools, and about what people say.
+#include "server/session/replication/teaching.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -8,9 +7,6 @@
 #include "common/base/printable.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
-#include "server/session/replication/messages.h"
-#include "server/session/replication/replicator_client.h"
-#include "server/session/replication/validation.h"
 
 namespace trocar::replication {
 namespace {
@@ -68,27 +64,41 @@ std::string words_of(const TeachOrder& order, const std::string& by, const std::
   return {};
 }
 
+Error cannot(std::string why) {
+  return {ErrorCode::Refused, std::move(why)};
+}
+
+const step::ToolFrame* find_tool(const step::SharedFrame& frame, ToolSlot slot) {
+  if (!frame) return nullptr;
+  const auto tool = std::ranges::find(frame->tools, slot, &step::ToolFrame::tool);
+  return tool == frame->tools.end() ? nullptr : &*tool;
+}
+
+// A hand that holds or cuts has something to lose.
+bool is_free(const step::ToolFrame& tool) {
+  return tool.verb != tool::Verb::Grasp && !(tool.verb == tool::Verb::Cut && tool.has_claim);
+}
+
 }  // namespace
 
-std::optional<Replicator::Ending> Replicator::handle_teach(Client& client,
-                                                           const proto::TeachRequest& request) {
+std::optional<Ending> Teaching::order(Speaker& who, const proto::TeachRequest& request) {
   const auto order = check_teach(request);
   if (!order) return Ending{EndReason::ProtocolError, order.error().message};
-  const auto role = client.participant->role;
+  const auto role = who.participant->role;
   const bool is_chat = order->action == TeachAction::Chat;
   if (!is_chat && !wire::rights_of(role).may_teach)
     return Ending{EndReason::Role, std::string("TeachRequest: \"") + name_of(order->action) +
                                        "\" is the instructor's, not of " + wire::one_of(role)};
-  const auto slot = client.participant->slot;
+  const auto slot = who.participant->slot;
   const auto refuse = [&](const std::string& why) {
     proto::Envelope answer;
-    describe_teaching(*order, slot, false, why, *answer.mutable_teach_event());
-    send(client, wire::encode_envelope(answer));
+    describe(*order, slot, false, why, *answer.mutable_teach_event());
+    room_.audience.send(who, wire::encode_envelope(answer));
     return std::nullopt;
   };
-  if (!client.sayings.take(is_chat ? 1 : 0.25, options_.clock_ns()))
+  if (!who.sayings.take(is_chat ? 1 : 0.25, room_.now_ns()))
     return refuse("not done: at most one line a second, or four other requests");
-  const auto* whom = roster_.find(order->participant);
+  const auto* whom = room_.roster.find(order->participant);
   if (is_about_one(order->action) && (whom == nullptr || whom->name != order->name))
     return refuse("not done: " + printable(order->name, 32) + " is not here any more");
   std::optional<ToolSlot> received;
@@ -98,33 +108,34 @@ std::optional<Replicator::Ending> Replicator::handle_teach(Client& client,
     received = *found;
   }
   const auto words =
-      words_of(*order, client.participant->name, whom == nullptr ? std::string() : whom->name);
-  const auto why = received ? hand_over({tool_slot(order->participant, order->tool), *received})
-                            : carry_out(*order, client, words);
+      words_of(*order, who.participant->name, whom == nullptr ? std::string() : whom->name);
+  const auto why = received
+                       ? hands_.hand_over({tool_slot(order->participant, order->tool), *received})
+                       : carry_out(*order, who, words);
   if (!why.empty()) return refuse(why);
   if (!is_chat) {
     log::info("{}", words);
-    if (options_.gate) options_.gate->note_action(client.applicant, name_of(order->action));
+    if (auto* gate = room_.options.gate) gate->note_action(who.applicant, name_of(order->action));
   }
   proto::LessonRecord record;
-  describe_teaching(*order, slot, true, words, *record.mutable_teach());
+  describe(*order, slot, true, words, *record.mutable_teach());
   if (received) {
     record.mutable_teach()->set_tool(tool_slot(order->participant, order->tool).value);
     record.mutable_teach()->set_receiver_tool(received->value);
   }
   proto::Envelope event;
   *event.mutable_teach_event() = record.teach();
-  record_lesson(record);
-  broadcast(wire::encode_envelope(event));
-  // Telling people may have ended anybody's session: `client` is not used from here on.
-  if (order->action == TeachAction::Expel) put_out(order->participant, words);
-  if (order->action == TeachAction::Wipe) wipe_drawing();
+  room_.record(wire::LessonKind::Said, record);
+  room_.audience.broadcast(wire::encode_envelope(event));
+  // Telling people may have ended anybody's session: `who` is not used from here on.
+  if (order->action == TeachAction::Expel) room_.audience.put_out(order->participant, words);
+  if (order->action == TeachAction::Wipe) drawing_.wipe();
   return std::nullopt;
 }
 
-void Replicator::describe_teaching(const TeachOrder& order, ParticipantSlot by, bool is_done,
-                                   const std::string& text, proto::TeachEvent& message) const {
-  message.set_tick(newest_tick());
+void Teaching::describe(const TeachOrder& order, ParticipantSlot by, bool is_done,
+                        const std::string& text, proto::TeachEvent& message) const {
+  message.set_tick(room_.audience.newest_tick());
   message.set_action(static_cast<proto::TeachAction>(order.action));
   message.set_by(by.value);
   if (is_about_one(order.action)) message.set_participant(order.participant.value);
@@ -134,9 +145,11 @@ void Replicator::describe_teaching(const TeachOrder& order, ParticipantSlot by, 
 
 // Returns why it cannot be done; empty: it is done. What makes people leave, or sends more than can
 // be skipped, is left to do once everybody is told.
-std::string Replicator::carry_out(const TeachOrder& order, Client& client,
-                                  const std::string& words) {
-  const auto* whom = roster_.find(order.participant);
+std::string Teaching::carry_out(const TeachOrder& order, const Speaker& who,
+                                const std::string& words) {
+  auto& roster = room_.roster;
+  const auto& by = who.participant->name;
+  const auto* whom = roster.find(order.participant);
   const auto whose_tools = [&](const char* lacks) {
     return whom->slot.has_tools() ? std::string() : "not done: " + whom->name + lacks;
   };
@@ -145,58 +158,51 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
     case TeachAction::Release: {
       if (auto why = whose_tools(" has no tools"); !why.empty()) return why;
       const bool freezes = order.action == TeachAction::Freeze;
-      freezes ? held_tools_.freeze(whom->slot) : held_tools_.release(whom->slot);
-      roster_.set_frozen_by(whom->slot, freezes ? client.participant->name : std::string());
-      participants_changed_ = true;
+      freezes ? hands_.held().freeze(whom->slot) : hands_.held().release(whom->slot);
+      roster.set_frozen_by(whom->slot, freezes ? by : std::string());
+      room_.has_changed = true;
       return {};
     }
     case TeachAction::TakeClaim:
       if (auto why = whose_tools(" holds nothing"); !why.empty()) return why;
-      for (const auto& input : held_tools_.open(whom->slot)) {
-        inbox_.push_sample(input);
-        note_loan(input.tool);
-      }
+      hands_.open(whom->slot);
       return {};
     case TeachAction::Expel:
       if (wire::rights_of(whom->role).may_teach) return "not done: nobody puts out an instructor";
-      door_.put_out(client_of(whom->slot)->applicant);
+      door_.put_out(room_.audience.find(whom->slot)->applicant);
       return {};
     case TeachAction::Rename: {
-      if (const auto renamed = roster_.rename(order.participant, order.text); !renamed)
+      if (const auto renamed = roster.rename(order.participant, order.text); !renamed)
         return "not done: " + renamed.error().message;
-      if (auto* renamed = client_of(order.participant)) renamed->participant->name = order.text;
-      participants_changed_ = true;
+      if (auto* renamed = room_.audience.find(order.participant))
+        renamed->participant->name = order.text;
+      room_.has_changed = true;
       return {};
     }
     case TeachAction::Admit:
       if (!door_.admit(order.text)) return "not done: nobody called " + order.text + " waits";
-      are_participants_told_ = false;
+      room_.is_told = false;
       return {};
     case TeachAction::Close:
     case TeachAction::Open:
       door_.set_closed(order.action == TeachAction::Close);
-      are_participants_told_ = false;
+      room_.is_told = false;
       return {};
     case TeachAction::End:
-      if (!options_.on_end_wanted) return "not done: this session ends by itself";
-      options_.on_end_wanted(words);
+      if (!room_.options.on_end_wanted) return "not done: this session ends by itself";
+      room_.options.on_end_wanted(words);
       return {};
     case TeachAction::GiveView:
     case TeachAction::EndView:
-      roster_.set_leader(order.participant);
-      last_view_.reset();
-      participants_changed_ = true;
+      roster.set_leader(order.participant);
+      drawing_.forget_view();
+      room_.has_changed = true;
       return {};
     case TeachAction::Pause:
     case TeachAction::GoOn:
+      return pace_.pause(order.action == TeachAction::Pause, by);
     case TeachAction::Slow:
-      if (!options_.on_pace) return "not done: this session keeps its own pace";
-      if (order.action == TeachAction::Slow) rate_ = order.rate;
-      if (order.action == TeachAction::Pause && is_paused_) return "not done: it is paused already";
-      if (order.action == TeachAction::GoOn && !is_paused_) return "not done: it goes on already";
-      if (order.action != TeachAction::Slow) is_paused_ = order.action == TeachAction::Pause;
-      set_pace(client.participant->name);
-      return {};
+      return pace_.slow(order.rate, by);
     case TeachAction::Wipe:
     case TeachAction::Note:
     case TeachAction::Chat:
@@ -207,45 +213,42 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
   return {};
 }
 
-// Nobody else could release these tools, or let time go on.
-void Replicator::release_unless_led() {
-  const auto present = roster_.list();
+void Teaching::release_unless_led() {
+  const auto present = room_.roster.list();
   if (std::ranges::any_of(present,
                           [](const auto& who) { return wire::rights_of(who.role).may_teach; }))
     return;
   for (const auto& who : present) {
-    held_tools_.release(who.slot);
-    roster_.set_frozen_by(who.slot, {});
+    hands_.held().release(who.slot);
+    room_.roster.set_frozen_by(who.slot, {});
   }
-  if (!is_paused_ && rate_ == 1) return;
-  is_paused_ = false;
-  rate_ = 1;
-  set_pace({});
+  pace_.reset();
 }
 
-Replicator::Client* Replicator::client_of(ParticipantSlot slot) const {
-  if (const auto away = away_.find(slot); away != away_.end()) return away->second.get();
-  for (const auto& [id, client] : clients_)
-    if (client->participant && client->participant->slot == slot) return client.get();
-  return nullptr;
-}
-
-void Replicator::put_out(ParticipantSlot slot, const std::string& words) {
-  auto* client = client_of(slot);
-  if (client == nullptr) return;  // it was too slow for what was said of it
-  if (away_.contains(slot)) {
-    leave(*client);
-    away_.erase(slot);
-  } else {
-    end_session(*client, {EndReason::PutOut, words});
+// Whoever gives may be away: it is what others can do for tissue that nobody's hand holds.
+Result<ToolSlot> Teaching::find_receiving_tool(const TeachOrder& order) const {
+  const auto* giver = room_.roster.find(order.participant);
+  const auto* receiver = room_.roster.find(order.receiver);
+  if (giver == nullptr || receiver == nullptr || receiver->name != order.receiver_name)
+    return cannot(printable(order.receiver_name, 32) + " is not here any more");
+  if (giver->slot == receiver->slot) return cannot(giver->name + " has it already");
+  for (const auto* who : {giver, receiver})
+    if (who->tools.empty()) return cannot(who->name + " has no tools");
+  if (static_cast<std::size_t>(order.tool) >= giver->tools.size())
+    return cannot(giver->name + " has one tool only");
+  if (receiver->is_away) return cannot(receiver->name + " has lost the connection");
+  if (!receiver->frozen_by.empty())
+    return cannot("the tools of " + receiver->name + " are held still: release them first");
+  const auto& frame = room_.audience.newest_frame();
+  if (find_tool(frame, tool_slot(giver->slot, order.tool)) == nullptr)
+    return cannot("nobody has seen that instrument of " + giver->name + " yet");
+  // The same hand is tried before the other.
+  for (const int number : {order.tool, 1 - order.tool}) {
+    if (static_cast<std::size_t>(number) >= receiver->tools.size()) continue;
+    const auto slot = tool_slot(receiver->slot, number);
+    if (const auto* tool = find_tool(frame, slot); tool != nullptr && is_free(*tool)) return slot;
   }
-}
-
-void Replicator::record_lesson(const proto::LessonRecord& record) {
-  if (!options_.on_lesson) return;
-  wire::LessonEntry entry{wire::LessonKind::Said, Bytes(record.ByteSizeLong())};
-  record.SerializeToArray(entry.message.data(), static_cast<int>(entry.message.size()));
-  options_.on_lesson(std::move(entry));
+  return cannot(receiver->name + " has no free hand");
 }
 
 }  // namespace trocar::replication

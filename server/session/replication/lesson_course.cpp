@@ -1,11 +1,9 @@
-// The replicator's part about the lesson that a session gives: its goals, and what people answer.
+#include "server/session/replication/lesson_course.h"
 
 #include "common/base/log.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
 #include "server/session/replication/lesson_messages.h"
-#include "server/session/replication/messages.h"
-#include "server/session/replication/replicator_client.h"
 
 namespace trocar::replication {
 namespace {
@@ -28,11 +26,20 @@ const char* words_of(lesson::Answer answer) {
 
 }  // namespace
 
-void Replicator::observe_lesson(const step::PublishedFrame& frame) {
+LessonCourse::LessonCourse(Room& room) : room_(room) {
+  const auto& options = room.options;
+  if (options.course)
+    course_.emplace(std::move(*options.course));
+  else if (options.lesson)
+    course_.emplace(*options.lesson);
+}
+
+void LessonCourse::observe(const step::PublishedFrame& frame, const wire::SurfaceLayout& layout) {
+  if (!course_) return;
   bool is_first = false;
-  if (!has_course_begun_) {
+  if (!has_begun_) {
     if (frame.tools.empty()) return;
-    is_first = has_course_begun_ = true;
+    is_first = has_begun_ = true;
     proto::LessonRecord record;
     record.mutable_lesson()->set_source(course_->lesson().source);
     for (const auto& picture : course_->lesson().pictures) {
@@ -40,47 +47,45 @@ void Replicator::observe_lesson(const step::PublishedFrame& frame) {
       recorded.set_name(picture.name);
       recorded.set_image(picture.bytes);
     }
-    record_lesson(record);
+    room_.record(wire::LessonKind::Said, record);
   }
   for (const auto& event : frame.claim_events)
     if (wire::is_refusal(event.outcome) || event.outcome == wire::ClaimOutcome::Slipped)
       course_->note_refusal();
-  const bool is_stage_over = course_->observe(moment_of(frame, layout_, tips_));
+  const bool is_stage_over = course_->observe(moment_of(frame, layout, tips_));
   if (is_stage_over) tell_line(words_of_last_stage(*course_), course_->results().back().is_reached);
   const bool is_hint_due = course_->shows_hint() && !is_hint_told_;
   if (is_stage_over || is_first || is_hint_due) tell_stage();
   if (frame.frame % kFramesPerProgress != 0 || course_->is_over()) return;
   proto::Envelope event;
   describe(*course_, *event.mutable_lesson_progress());
-  const auto bytes = wire::encode_envelope(event);
-  for (const auto& [id, client] : clients_)
-    if (client->listens()) send(*client, bytes);
+  room_.audience.offer(wire::encode_envelope(event));
 }
 
-void Replicator::tell_stage() {
+void LessonCourse::tell_stage() {
   is_hint_told_ = course_->shows_hint();
   proto::LessonRecord record;
   describe(*course_, *record.mutable_stage());
-  record_lesson(record);
+  room_.record(wire::LessonKind::Said, record);
   proto::Envelope event;
   *event.mutable_lesson_stage() = record.stage();
-  broadcast(wire::encode_envelope(event));
+  room_.audience.broadcast(wire::encode_envelope(event));
 }
 
-void Replicator::tell_line(const std::string& words, bool is_good) {
+void LessonCourse::tell_line(const std::string& words, bool is_good) {
   log::info("{}", words);
   proto::Envelope event;
-  event.mutable_teach_event()->set_tick(newest_tick());
+  event.mutable_teach_event()->set_tick(room_.audience.newest_tick());
   event.mutable_teach_event()->set_is_done(true);
   event.mutable_teach_event()->set_is_trouble(!is_good);
   event.mutable_teach_event()->set_text(words);
-  broadcast(wire::encode_envelope(event));
+  room_.audience.broadcast(wire::encode_envelope(event));
 }
 
-std::optional<Replicator::Ending> Replicator::handle_lesson(Client& client,
-                                                            const proto::LessonRequest& request) {
-  const auto role = client.participant->role;
-  const auto slot = client.participant->slot;
+std::optional<Ending> LessonCourse::ask(Speaker& who, const proto::LessonRequest& request,
+                                        const wire::SurfaceLayout& layout) {
+  const auto role = who.participant->role;
+  const auto slot = who.participant->slot;
   const int action = request.action();
   const bool answers = action == proto::LESSON_ANSWER;
   if (!answers && action != proto::LESSON_NEXT && action != proto::LESSON_RESTART)
@@ -91,45 +96,50 @@ std::optional<Replicator::Ending> Replicator::handle_lesson(Client& client,
                                        (answers ? "who answers has a tool, not "
                                                 : "stages are the instructor's, not of ") +
                                        wire::one_of(role)};
-  if (answers && request.tool() >= client.participant->tools.size())
+  if (answers && request.tool() >= who.participant->tools.size())
     return Ending{EndReason::ProtocolError,
                   "LessonRequest.tool: " + std::to_string(request.tool()) + ", you have " +
-                      std::to_string(client.participant->tools.size()) + " (counted from 0)"};
+                      std::to_string(who.participant->tools.size()) + " (counted from 0)"};
   const auto refuse = [&](const std::string& why) {
-    proto::Envelope answer;
-    describe_teaching({}, slot, false, "not done: " + why, *answer.mutable_teach_event());
-    send(client, wire::encode_envelope(answer));
+    room_.refuse(who, "not done: " + why);
     return std::nullopt;
   };
   if (!course_) return refuse("this session gives no lesson");
-  if (!client.sayings.take(0.5, options_.clock_ns())) return refuse("wait a second");
-  if (!has_course_begun_) return refuse("the lesson begins when somebody has a tool");
+  if (!who.sayings.take(0.5, room_.now_ns())) return refuse("wait a second");
+  if (!has_begun_) return refuse("the lesson begins when somebody has a tool");
   const auto tool = tool_slot(slot, static_cast<int>(request.tool()));
   proto::LessonRecord record;
-  record.mutable_input()->set_tick(newest_tick());
+  record.mutable_input()->set_tick(room_.audience.newest_tick());
   record.mutable_input()->set_action(request.action());
   if (answers) record.mutable_input()->set_tool(tool.value);
   if (answers) {
-    const auto answer = course_->answer(tool, moment_of(*encoder_.current(), layout_, tips_));
+    const auto answer =
+        course_->answer(tool, moment_of(*room_.audience.newest_frame(), layout, tips_));
     if (answer == lesson::Answer::NotAsked || answer == lesson::Answer::NoTissue)
       return refuse(words_of(answer));
-    record_lesson(record);
-    tell_line(client.participant->name + " says that it is here: " + words_of(answer),
+    room_.record(wire::LessonKind::Said, record);
+    tell_line(who.participant->name + " says that it is here: " + words_of(answer),
               answer == lesson::Answer::Right);
     if (answer == lesson::Answer::Wrong) return std::nullopt;
     tell_line(words_of_last_stage(*course_));
   } else {
     action == proto::LESSON_NEXT ? course_->skip() : course_->restart();
-    record_lesson(record);
-    if (options_.gate)
-      options_.gate->note_action(client.applicant,
-                                 action == proto::LESSON_NEXT ? "next-stage" : "restart-lesson");
-    tell_line(client.participant->name + (action == proto::LESSON_NEXT
-                                              ? " goes on to the next stage"
-                                              : " begins the lesson anew"));
+    room_.record(wire::LessonKind::Said, record);
+    if (auto* gate = room_.options.gate)
+      gate->note_action(who.applicant,
+                        action == proto::LESSON_NEXT ? "next-stage" : "restart-lesson");
+    tell_line(who.participant->name + (action == proto::LESSON_NEXT ? " goes on to the next stage"
+                                                                    : " begins the lesson anew"));
   }
   tell_stage();
   return std::nullopt;
+}
+
+bool LessonCourse::show(const Speaker& newcomer) const {
+  if (!course_) return true;
+  proto::Envelope event;
+  describe(*course_, *event.mutable_lesson_stage());
+  return room_.audience.send(newcomer, wire::encode_envelope(event));
 }
 
 }  // namespace trocar::replication
