@@ -180,8 +180,10 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
     : resolved_(with_response(std::move(resolved))),
       solver_kind_(solver),
       step_count_(steps_of(scenario().run)),
-      simulation_(resolved_.organ, threads, cutting_of(scenario().run), loads_of(resolved_),
-                  scheme_of(scenario().run, solver)),
+      simulation_(resolved_.organ, threads,
+                  {.cutting = cutting_of(scenario().run),
+                   .loads = loads_of(resolved_),
+                   .strain_scheme = scheme_of(scenario().run, solver)}),
       decisions_(decisions_of(scenario().run, solver, simulation_)) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
     watched_.push_back(is_reaction(scenario().probes[i])

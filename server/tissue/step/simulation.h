@@ -17,16 +17,9 @@ Status validate(const TickDecisions& decisions);
 class Simulation {
  public:
   // workers: threads that may share the solver's work; results do not depend on it.
-  // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
-  // self-contact, and its states cannot be restored.
-  // loads: what acts besides tools, of a scenario that validate() accepts.
-  // strain_scheme: of averaged strain; empty: what dynamics::scheme_for() says for ticks of a
-  // session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
-  explicit Simulation(organ::Organ organ, unsigned workers = 1,
-                      const cutting::Settings& cutting = {}, LoadRules loads = {},
-                      std::optional<dynamics::StrainScheme> strain_scheme = {});
+  explicit Simulation(organ::Organ organ, unsigned workers = 1, SceneRules rules = {});
 
-  // Another one of the same organ and loads, at the beginning. Shares with this one what never
+  // Another one of the same organ and rules, at the beginning. Shares with this one what never
   // changes, so that they may be used by two threads.
   Simulation beside() const;
 
@@ -56,6 +49,7 @@ class Simulation {
   Tick current_tick() const { return state_->world.tick; }
   const wire::SurfaceLayout& layout() const { return state_->cuts.layout(); }
   const organ::Organ& organ() const { return scene_->organ; }
+  const SceneRules& rules() const { return scene_->rules; }
   const State& state() const { return *state_; }
   const StepContext& context() const { return *context_; }
   // Whoever is interested in reactions watches them here.

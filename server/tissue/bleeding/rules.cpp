@@ -1,4 +1,4 @@
-#include "server/session/bleeding/rules.h"
+#include "server/tissue/bleeding/rules.h"
 
 #include "common/math/tube.h"
 
@@ -25,7 +25,7 @@ Status validate(const Rules& rules) {
     return wrong("clotting_time_s", "1 to 100000 s");
   if (!is_within(rules.ooze_pressure_pa, 0, kMostPressurePa))
     return wrong("ooze_pressure_pa", "0 to 100000 Pa");
-  if (rules.vessels.size() > lesson::kMostStructures) return wrong("vessel", "0 to 16 of them");
+  if (rules.vessels.size() > kMostVessels) return wrong("vessel", "0 to 16 of them");
   for (const auto& vessel : rules.vessels) {
     const bool is_near = is_finite(vessel.from_m) && is_finite(vessel.to_m) &&
                          length(vessel.from_m) <= 2 && length(vessel.to_m) <= 2;
@@ -37,19 +37,6 @@ Status validate(const Rules& rules) {
       return wrong("vessel.most_flow_m3_s", "1e-9 to 1e-3 m^3/s");
   }
   return {};
-}
-
-Rules rules_of(const lesson::Lesson& lesson) {
-  Rules rules;
-  for (const auto& structure : lesson.structures)
-    if (structure.vessel_pressure_pa > 0)
-      rules.vessels.push_back({.name = structure.name,
-                               .from_m = structure.from_m,
-                               .to_m = structure.to_m,
-                               .radius_m = structure.radius_m,
-                               .pressure_pa = structure.vessel_pressure_pa,
-                               .most_flow_m3_s = structure.vessel_flow_m3_s});
-  return rules;
 }
 
 }  // namespace trocar::bleeding

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/wire/quantise.h"
-#include "server/session/bleeding/blood.h"
-#include "server/session/bleeding/surface_graph.h"
+#include "server/tissue/bleeding/blood.h"
+#include "server/tissue/bleeding/surface_graph.h"
 
 namespace trocar::bleeding {
 

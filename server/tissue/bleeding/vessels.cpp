@@ -1,4 +1,4 @@
-#include "server/session/bleeding/vessels.h"
+#include "server/tissue/bleeding/vessels.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "server/session/bleeding/blood.h"
+#include "server/tissue/bleeding/blood.h"
 
 #include <algorithm>
 #include <numeric>
@@ -28,7 +28,19 @@ std::int64_t Blood::on_surface_pl() const {
   return std::accumulate(volume_pl.begin(), volume_pl.end(), std::int64_t{0});
 }
 
-void Blood::visit_state(world::StateArchive& archive) {
+void Blood::update_hash(StateHasher& hasher) {
+  hash_ = computed_hash(hasher);
+}
+
+std::uint64_t Blood::computed_hash(StateHasher& hasher) {
+  if (volume_pl.empty()) return 0;
+  hasher.reset();
+  auto archive = world::StateArchive::hashing(hasher);
+  visit_arrays(archive);
+  return hasher.digest();
+}
+
+void Blood::visit_arrays(world::StateArchive& archive) {
   archive.sized_array(volume_pl, wire::kMaxSurfaceVertices);
   archive.sized_array(open, wire::kMaxSurfaceVertices);
   archive.sized_array(was_wound, wire::kMaxSurfaceVertices);
@@ -40,7 +52,18 @@ void Blood::visit_state(world::StateArchive& archive) {
   archive.value(shed_pl);
   archive.value(dripped_pl);
   archive.value(sucked_pl);
+}
+
+void Blood::visit_state(world::StateArchive& archive) {
+  archive.value(hash_);
+  if (archive.is_hashing()) return;
+  visit_arrays(archive);
   if (!archive.is_reading() || !archive.ok()) return;
+  StateHasher hasher;
+  if (!is_whole() || hash_ != computed_hash(hasher)) archive.fail();
+}
+
+bool Blood::is_whole() const {
   const auto vertices = volume_pl.size();
   const bool has_sizes = open.size() == vertices && was_wound.size() == vertices &&
                          levels.size() == vertices && clip_place_m.size() == clip_vessel.size() &&
@@ -50,12 +73,10 @@ void Blood::visit_state(world::StateArchive& archive) {
   const bool has_volumes = std::ranges::all_of(volume_pl, [](auto pl) {
     return is_volume(pl) && pl < kMostPl / std::int64_t{wire::kMaxSurfaceVertices};
   });
-  const bool is_whole = has_sizes && has_volumes && is_volume(shed_pl) && is_volume(dripped_pl) &&
-                        is_volume(sucked_pl) &&
-                        shed_pl == on_surface_pl() + dripped_pl + sucked_pl &&
-                        std::ranges::all_of(open, [](auto o) { return o <= kFreshlyCut; }) &&
-                        std::ranges::all_of(clip_place_m, [](auto& p) { return is_finite(p); });
-  if (!is_whole) archive.fail();
+  return has_sizes && has_volumes && is_volume(shed_pl) && is_volume(dripped_pl) &&
+         is_volume(sucked_pl) && shed_pl == on_surface_pl() + dripped_pl + sucked_pl &&
+         std::ranges::all_of(open, [](auto o) { return o <= kFreshlyCut; }) &&
+         std::ranges::all_of(clip_place_m, [](auto& p) { return is_finite(p); });
 }
 
 }  // namespace trocar::bleeding

@@ -1,8 +1,8 @@
-#include "server/session/bleeding/film.h"
+#include "server/tissue/bleeding/film.h"
 
 #include <algorithm>
 
-#include "server/session/bleeding/rules.h"
+#include "server/tissue/bleeding/rules.h"
 
 namespace trocar::bleeding {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-// The blood of a session as arrays: all of it that decides what comes next, and nothing else.
+// The blood of a session as arrays: state of the tick.
 // Volumes are whole picolitres, so that sums are exact in any order:
 //   shed = on the surface + dripped + sucked.
 
@@ -38,9 +38,20 @@ struct Blood {
   // dripped off.
   void resize(std::size_t vertices);
   std::int64_t on_surface_pl() const;  // the sum over all vertices
+
+  // Most ticks change nothing of it, so the tick hash covers this hash of it, which whoever changes
+  // it brings up to date.
+  void update_hash(StateHasher& hasher);
   // Reading refuses what could not have come about.
   void visit_state(world::StateArchive& archive);
   bool operator==(const Blood&) const = default;
+
+ private:
+  void visit_arrays(world::StateArchive& archive);
+  std::uint64_t computed_hash(StateHasher& hasher);
+  bool is_whole() const;
+
+  std::uint64_t hash_ = 0;  // 0 before the first frame
 };
 
 }  // namespace trocar::bleeding

@@ -1,4 +1,4 @@
-#include "server/session/bleeding/instruments.h"
+#include "server/tissue/bleeding/instruments.h"
 
 #include <algorithm>
 #include <numbers>
@@ -16,24 +16,19 @@ bool is_near(const Vec3d& a, const Vec3d& b, double reach_m) {
 
 }  // namespace
 
-void Instruments::read(std::span<const step::ToolFrame> frame, const hands::ToolTable& tools) {
+void Instruments::read(std::span<const ToolAtWork> tools) {
   presses.clear(), suctions.clear(), coagulators.clear(), clippers.clear();
-  for (const auto& tool : frame) {
-    if (tool.is_silent || tool.is_inside) continue;
-    const auto& shape = tools[tool.tool].shape;
-    const Vec3d tip = to_double(tool.world_from_proxy.position);
+  for (const auto& [slot, shape, verb, tip, force_n] : tools) {
     const double radius = shape.radius_m, half_width = shape.half_width_m, reach = shape.reach_m;
-    const bool is_used = tool.verb == tool::Verb::Push;
-    if (is_used && shape.form == tool::Form::Suction)
-      suctions.push_back({tip, reach, tool.tool.value});
+    const bool is_used = verb == tool::Verb::Push;
+    if (is_used && shape.form == tool::Form::Suction) suctions.push_back({tip, reach, slot.value});
     if (is_used && shape.form == tool::Form::Coagulator)
-      coagulators.push_back({tip, reach, tool.tool.value});
-    if (tool.verb == tool::Verb::Cut && shape.form == tool::Form::Hook)
-      coagulators.push_back({tip, kHookSealsM, tool.tool.value});
-    if (tool.verb == tool::Verb::Grasp && shape.form == tool::Form::Clipper)
-      clippers.push_back({tip, reach, tool.tool.value});
-    const bool holds_or_cuts = tool.verb == tool::Verb::Grasp || tool.verb == tool::Verb::Cut;
-    const double force_n = length(to_double(tool.force_n));
+      coagulators.push_back({tip, reach, slot.value});
+    if (verb == tool::Verb::Cut && shape.form == tool::Form::Hook)
+      coagulators.push_back({tip, kHookSealsM, slot.value});
+    if (verb == tool::Verb::Grasp && shape.form == tool::Form::Clipper)
+      clippers.push_back({tip, reach, slot.value});
+    const bool holds_or_cuts = verb == tool::Verb::Grasp || verb == tool::Verb::Cut;
     if (holds_or_cuts || force_n == 0) continue;
     const double area = std::numbers::pi * radius * radius + 4 * radius * half_width;
     presses.push_back({tip, radius + half_width + kBesideM, force_n / area});

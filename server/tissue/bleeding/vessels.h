@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/session/bleeding/blood.h"
-#include "server/session/bleeding/film.h"
-#include "server/session/bleeding/instruments.h"
-#include "server/session/bleeding/rules.h"
+#include "server/tissue/bleeding/blood.h"
+#include "server/tissue/bleeding/film.h"
+#include "server/tissue/bleeding/instruments.h"
+#include "server/tissue/bleeding/rules.h"
 
 namespace trocar::bleeding {
 

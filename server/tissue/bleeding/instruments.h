@@ -5,11 +5,20 @@
 #include <span>
 #include <vector>
 
+#include "common/base/ids.h"
 #include "common/math/vec3.h"
-#include "server/tissue/hands/tool_table.h"
-#include "server/tissue/step/published_frame.h"
+#include "common/tool/tool.h"
 
 namespace trocar::bleeding {
+
+// A tool that is not silent and has not appeared inside tissue.
+struct ToolAtWork {
+  ToolSlot tool;
+  tool::ToolShape shape;
+  tool::Verb verb = tool::Verb::None;
+  Vec3d tip_m;         // where the tissue lets it be
+  double force_n = 0;  // of the tissue on it
+};
 
 // All reaches are from the tip, m.
 struct Press {
@@ -27,7 +36,7 @@ struct Instruments {
   std::vector<Press> presses;
   std::vector<Touch> suctions, coagulators, clippers;  // those that are used now
 
-  void read(std::span<const step::ToolFrame> frame, const hands::ToolTable& tools);
+  void read(std::span<const ToolAtWork> tools);
   // True: something presses there with at least this.
   bool is_pressed(const Vec3d& place_m, double pressure_pa) const;
   bool is_coagulated(const Vec3d& place_m) const;

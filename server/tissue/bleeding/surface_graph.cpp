@@ -1,4 +1,4 @@
-#include "server/session/bleeding/surface_graph.h"
+#include "server/tissue/bleeding/surface_graph.h"
 
 #include <algorithm>
 
