@@ -248,6 +248,22 @@ std::unique_ptr<StepContext> Simulation::context_of(State& state) const {
   return std::make_unique<StepContext>(*scene_, workers_, state);
 }
 
+void Simulation::start_relaxed(std::span<const Vec3f> displacements,
+                               std::span<const Vec3f> velocities) {
+  auto& world = state_->world;
+  TROCAR_ASSERT(displacements.size() == world.node_count());
+  std::ranges::copy(displacements, world.displacements.begin());
+  std::ranges::fill(world.velocities, Vec3f{});
+  std::ranges::copy(velocities, world.velocities.begin());
+  dynamics::start_relaxed(scene_->organ, world, state_->strain_scheme);
+  context_ = context_of(*state_);
+}
+
+void Simulation::tick_by(const std::function<void(world::World&)>& move) {
+  ++state_->world.tick;
+  move(state_->world);
+}
+
 void Simulation::write_snapshot(Bytes& out) const {
   auto archive = world::StateArchive::writing(out);
   state_->visit(archive);

@@ -4,8 +4,10 @@
 // snapshots both ways. Used by the server, by scenarios, by re-simulation of journals, and by
 // tests. One thread at a time.
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "server/tissue/step/tick.h"
 
@@ -56,14 +58,15 @@ class Simulation {
   ExternalLoads& loads() { return *loads_; }
   const ExternalLoads& loads() const { return *loads_; }
 
-  // For drivers that move the tissue by other means than ticks, such as the search for an
-  // equilibrium: they change the state, then call resume(), and ticks go on from there as from a
-  // restored snapshot.
-  State& editable_state() { return *state_; }
-  StepContext& editable_context() { return *context_; }
-  void resume() { context_ = context_of(*state_); }
+  // The tissue begins so, m and m/s per node, at rest without velocities; relaxed stress is that of
+  // having been there for long. Ticks go on from there as from a restored snapshot.
+  void start_relaxed(std::span<const Vec3f> displacements, std::span<const Vec3f> velocities = {});
+  // A tick of time in which another integrator moves the nodes, and nothing else happens.
+  void tick_by(const std::function<void(world::World&)>& move);
 
  private:
+  friend class Equilibrium;  // moves the same state without time
+
   Simulation(std::shared_ptr<const Scene> scene, unsigned workers);
 
   void use_mark(hands::MarkAction action, std::uint8_t number);
