@@ -17,8 +17,12 @@ export interface Hooks {
 const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
 // A server that is busy may take long to let somebody in, and one that has just begun may not hear yet.
 const kJoinSilenceMs = 15_000, kJoinTries = 4;
-// Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
-const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36, 40, 80]);
+// What the replica alone reads. Such messages are told by the numbers with which they begin, and not parsed.
+const kOfReplica: Envelope['message']['case'][] = [
+  'surfaceFrame', 'frameState', 'surfaceChange', 'surfaceTopology', 'surfaceSlice', 'frameStatePart', 'datagramProbe', 'hapticPatches',
+  'hapticLaw', 'pointEvent', 'drawing', 'fineSurfacePart',
+];
+const kNumbersOfReplica = new Set(kOfReplica.map(name => EnvelopeSchema.fields.find(field => field.localName === name)?.number));
 
 export class Session {
   state: State = 'joining';
@@ -134,7 +138,7 @@ export class Session {
     try {
       this.replica.receive(bytes, now);
       for (const answer of this.replica.takeOutbox()) this.send(answer);
-      if (!kSurfaceFields.has(fieldOf(bytes))) this.heed(fromBinary(EnvelopeSchema, bytes), now);
+      if (!kNumbersOfReplica.has(fieldOf(bytes))) this.heed(fromBinary(EnvelopeSchema, bytes), now);
     } catch (error) {
       this.end(`This page cannot go on: ${error instanceof Error ? error.message : String(error)}`);
       this.socket?.close(1000);

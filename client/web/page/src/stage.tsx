@@ -6,7 +6,8 @@ import { ToolForm, ToolShapeSchema, type Participant, type ToolShape } from './g
 import { create } from '@bufbuild/protobuf';
 import { Overlay, Verb, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 import type { Part, ViewCount } from './pane';
-import { Picture, type Guide } from './scene';
+import type { Guide } from './instruments';
+import { Picture } from './scene';
 import { PaneChoices } from './views';
 
 export function forceOf(tool: Tool): number { return Math.hypot(...tool.forceN); }

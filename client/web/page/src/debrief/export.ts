@@ -2,7 +2,8 @@
 
 import type { RecordedEvent } from '../recording';
 import type { Tool } from '../replica';
-import type { Guide, Picture } from '../scene';
+import type { Guide } from '../instruments';
+import type { Picture } from '../scene';
 import { hex } from '../panels';
 import { kBinTicks, type Course } from './course';
 import { kLabelAbove, label, sketch, type Line } from './sketch';
