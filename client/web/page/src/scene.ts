@@ -1,8 +1,25 @@
 // The picture: geometry of the module, drawn with the native client's shaders.
 
 import {
-  BufferAttribute, BufferGeometry, Data3DTexture, DynamicDrawUsage, GLSL3, LinearFilter, Matrix4, Mesh, RawShaderMaterial,
-  Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type Intersection, type IUniform, type PerspectiveCamera,
+  BufferAttribute,
+  BufferGeometry,
+  Data3DTexture,
+  DynamicDrawUsage,
+  GLSL3,
+  LinearFilter,
+  Matrix4,
+  Mesh,
+  RawShaderMaterial,
+  Raycaster,
+  RepeatWrapping,
+  Scene,
+  Vector2,
+  Vector3,
+  Vector4,
+  WebGLRenderer,
+  type Intersection,
+  type IUniform,
+  type PerspectiveCamera,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource } from './gen/shaders';
@@ -13,17 +30,28 @@ import { Pane, partsOf, type Part, type ViewCount } from './pane';
 import { Overlay, type Replica, type Vec3 } from './replica';
 
 // A place of the surface: shares of the corners of a triangle, which are numbers of vertices.
-export interface SurfacePlace { corners: Vec3; shares: Vec3 }
+export interface SurfacePlace {
+  corners: Vec3;
+  shares: Vec3;
+}
 const kNoise = 64;
-const kHazePerMiddle = 0.55, kScopeHaze: [number, number] = [0.05, 4]; // as in the native picture
+const kHazePerMiddle = 0.55,
+  kScopeHaze: [number, number] = [0.05, 4]; // as in the native picture
 const kPitch = 0.42; // of the views at the start: from the front, a side, the back, and above
-const kStarts: [number, number][] = [[0, kPitch], [Math.PI / 2, kPitch], [Math.PI, kPitch], [0, 1.45]];
-const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
+const kStarts: [number, number][] = [
+  [0, kPitch],
+  [Math.PI / 2, kPitch],
+  [Math.PI, kPitch],
+  [0, 1.45],
+];
+const kSlowMs = 45,
+  kJudged = 40; // pictures, before quality is lowered
 
 export class Picture {
   overlay: Overlay = Overlay.Regions;
   showsArrows = true;
-  onLetGo: (view: number) => void = () => undefined; // the person moves a view, so that it follows nobody
+  // The person moves a view, so that it follows nobody.
+  onLetGo: (view: number) => void = () => undefined;
   onTurn: () => void = () => undefined; // likewise of the first, whatever it follows
   onActive: (view: number) => void = () => undefined; // another one is moved from now on
   pictures = 0;
@@ -46,8 +74,17 @@ export class Picture {
   private width = 1;
   private height = 1;
 
-  constructor(readonly canvas: HTMLCanvasElement, labels: HTMLElement, private readonly replica: Replica, private readonly guide: Guide) {
-    const gl = canvas.getContext('webgl2', { antialias: !isSlow(), alpha: true, powerPreference: 'high-performance' });
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    labels: HTMLElement,
+    private readonly replica: Replica,
+    private readonly guide: Guide,
+  ) {
+    const gl = canvas.getContext('webgl2', {
+      antialias: !isSlow(),
+      alpha: true,
+      powerPreference: 'high-performance',
+    });
     if (!gl) throw new Error('This browser cannot draw here: it has no WebGL 2.');
     this.quality = rendersInSoftware(gl) ? 1 : 0;
     this.renderer = new WebGLRenderer({ canvas, context: gl });
@@ -62,31 +99,62 @@ export class Picture {
       this.letGo();
     });
     // Before the controls: they move the view that was touched.
-    for (const kind of ['pointerdown', 'wheel'] as const) canvas.addEventListener(kind, this.touch, true);
+    for (const kind of ['pointerdown', 'wheel'] as const)
+      canvas.addEventListener(kind, this.touch, true);
     const noise = new Data3DTexture(replica.noise(kNoise), kNoise, kNoise, kNoise);
     noise.wrapS = noise.wrapT = noise.wrapR = RepeatWrapping;
     noise.magFilter = noise.minFilter = LinearFilter;
     noise.needsUpdate = true;
     const four = (): Vector4[] => Array.from({ length: kShadows }, () => new Vector4());
     this.uniforms = {
-      clip_from_world: { value: new Matrix4() }, eye: { value: new Vector3() }, key_direction: { value: new Vector3(0, 1, 0) },
-      fill_direction: { value: new Vector3(0, 1, 0) }, haze: { value: new Vector2() }, noise: { value: noise }, shadow_count: { value: 0 },
-      shadow_tip: { value: four() }, shadow_shaft: { value: four() },
+      clip_from_world: { value: new Matrix4() },
+      eye: { value: new Vector3() },
+      key_direction: { value: new Vector3(0, 1, 0) },
+      fill_direction: { value: new Vector3(0, 1, 0) },
+      haze: { value: new Vector2() },
+      noise: { value: noise },
+      shadow_count: { value: 0 },
+      shadow_tip: { value: four() },
+      shadow_shaft: { value: four() },
     };
-    this.organ = new Mesh(new BufferGeometry(), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: organVertexSource, uniforms: this.uniforms }));
+    this.organ = new Mesh(
+      new BufferGeometry(),
+      new RawShaderMaterial({
+        glslVersion: GLSL3,
+        vertexShader: organVertexSource,
+        uniforms: this.uniforms,
+      }),
+    );
     this.organ.frustumCulled = false;
     this.fine = new FineLayer(this.uniforms);
     this.field = new Field(this.uniforms);
-    this.instruments = new Instruments(this.scene, this.uniforms, labels, replica, guide, this.main, at => this.onCanvas(at));
+    this.instruments = new Instruments(
+      this.scene,
+      this.uniforms,
+      labels,
+      replica,
+      guide,
+      this.main,
+      at => this.onCanvas(at),
+    );
     this.scene.add(this.organ, this.fine.mesh, this.field.backdrop, this.field.scopeEdge);
     this.setQuality(this.quality);
   }
 
-  get isPlain(): boolean { return this.quality > 0; }
-  // One line for people: why the fine surface, or its picture, is not drawn; empty: nothing is wrong.
-  get fineFault(): string { return this.replica.fineFault || this.fine.fault; }
-  get views(): ViewCount { return this.count; }
-  get parts(): Part[] { return this.panes.slice(0, this.count).map(pane => pane.part); }
+  get isPlain(): boolean {
+    return this.quality > 0;
+  }
+  // One line for people: why the fine surface, or its picture, is not drawn; empty: nothing is
+  // wrong.
+  get fineFault(): string {
+    return this.replica.fineFault || this.fine.fault;
+  }
+  get views(): ViewCount {
+    return this.count;
+  }
+  get parts(): Part[] {
+    return this.panes.slice(0, this.count).map(pane => pane.part);
+  }
   // How many views there are; the first is always there.
   set views(count: ViewCount) {
     this.count = count;
@@ -106,7 +174,9 @@ export class Picture {
     Object.assign(this.panes[view] ?? {}, { follows: participant, isAlong });
   }
   // A view sees with the tool in a slot, as long as it is there; null: from its own place.
-  seeWith(view: number, slot: number | null): void { Object.assign(this.panes[view] ?? {}, { seesWith: slot }); }
+  seeWith(view: number, slot: number | null): void {
+    Object.assign(this.panes[view] ?? {}, { seesWith: slot });
+  }
   // Sets the view as it was at the beginning.
   resetView(): void {
     this.letGo();
@@ -127,7 +197,8 @@ export class Picture {
   }
   // Where the first view is, m: for others, who follow it.
   view(): { eye: Vec3; target: Vec3 } {
-    const { x, y, z } = this.camera.position, to = this.main.target;
+    const { x, y, z } = this.camera.position,
+      to = this.main.target;
     return { eye: [x, y, z], target: [to.x, to.y, to.z] };
   }
   look(eye: Vec3, target: Vec3): void {
@@ -136,17 +207,28 @@ export class Picture {
     this.main.target.set(...target);
   }
   // Where each view looks from, m.
-  places(): Vec3[] { return this.panes.slice(0, this.count).map(({ camera: { position: p } }) => [p.x, p.y, p.z]); }
-  private get main(): Pane { return this.panes[0]!; }
-  private get moved(): Pane { return this.panes[this.active] ?? this.main; }
-  private get camera(): PerspectiveCamera { return this.main.camera; }
+  places(): Vec3[] {
+    return this.panes.slice(0, this.count).map(({ camera: { position: p } }) => [p.x, p.y, p.z]);
+  }
+  private get main(): Pane {
+    return this.panes[0]!;
+  }
+  private get moved(): Pane {
+    return this.panes[this.active] ?? this.main;
+  }
+  private get camera(): PerspectiveCamera {
+    return this.main.camera;
+  }
   private readonly touch = (event: MouseEvent): void => {
-    const rect = this.canvas.getBoundingClientRect(), x = (event.clientX - rect.left) / rect.width, y = (event.clientY - rect.top) / rect.height;
+    const rect = this.canvas.getBoundingClientRect(),
+      x = (event.clientX - rect.left) / rect.width,
+      y = (event.clientY - rect.top) / rect.height;
     const view = this.panes.findIndex((pane, i) => i < this.count && pane.has(x, y));
     if (view >= 0 && view !== this.active) this.activate(view);
   };
   dispose(): void {
-    for (const kind of ['pointerdown', 'wheel'] as const) this.canvas.removeEventListener(kind, this.touch, true);
+    for (const kind of ['pointerdown', 'wheel'] as const)
+      this.canvas.removeEventListener(kind, this.touch, true);
     this.controls.dispose();
     this.field.dispose();
     this.fine.dispose();
@@ -157,13 +239,19 @@ export class Picture {
   resize(width: number, height: number): void {
     this.width = Math.max(1, width);
     this.height = Math.max(1, height);
-    const ratio = Math.min(2, window.devicePixelRatio || 1) * (this.quality === 2 ? 0.6 : this.quality === 1 ? Math.min(1, 1 / (window.devicePixelRatio || 1)) : 1);
+    const ratio =
+      Math.min(2, window.devicePixelRatio || 1) *
+      (this.quality === 2
+        ? 0.6
+        : this.quality === 1
+          ? Math.min(1, 1 / (window.devicePixelRatio || 1))
+          : 1);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(this.width, this.height, false);
     partsOf(this.count, this.height > this.width).forEach((part, i) => {
       const pane = this.panes[i]!;
       pane.part = part;
-      pane.camera.aspect = this.width * part[2] / (this.height * part[3]);
+      pane.camera.aspect = (this.width * part[2]) / (this.height * part[3]);
       pane.camera.updateProjectionMatrix();
     });
   }
@@ -172,28 +260,40 @@ export class Picture {
   draw(nowMs: number): boolean {
     const begin = performance.now();
     const seconds = Math.min(0.25, Math.max(0.001, (nowMs - this.lastMs) / 1000));
-    if (!this.replica.update(nowMs, [100_000, 16_000, 8_000][this.quality] ?? 8_000, this.overlay)) return false;
+    if (!this.replica.update(nowMs, [100_000, 16_000, 8_000][this.quality] ?? 8_000, this.overlay))
+      return false;
     this.judge(nowMs - this.lastMs);
     this.lastMs = nowMs;
     if (this.replica.geometryVersion !== this.version) this.loadGeometry();
     this.loadPositions();
-    const tools = this.replica.tools(), shown = this.panes.slice(0, this.count);
+    const tools = this.replica.tools(),
+      shown = this.panes.slice(0, this.count);
     for (const pane of shown) {
       if (!pane.isFramed) this.frame(pane);
       pane.follow(tools, seconds);
       pane.camera.lookAt(pane.target);
       const lender = tools.find(tool => tool.slot === pane.seesWith);
-      pane.lookThrough(lender ? this.replica.lens(lender.slot, this.guide.shapeOf(lender.slot)) : null);
+      pane.lookThrough(
+        lender ? this.replica.lens(lender.slot, this.guide.shapeOf(lender.slot)) : null,
+      );
     }
     this.controls.update();
     this.instruments.place(tools, seconds, this.showsArrows);
     this.fine.load(this.replica);
     // The fine surface takes the place of the outside.
-    this.organ.geometry.setDrawRange(this.fine.isShown ? this.replica.outerTriangles * 3 : 0, Infinity);
+    this.organ.geometry.setDrawRange(
+      this.fine.isShown ? this.replica.outerTriangles * 3 : 0,
+      Infinity,
+    );
     this.renderer.setScissorTest(this.count > 1);
     for (const [view, pane] of shown.entries()) {
       const [left, top, width, height] = pane.part;
-      const box = [left * this.width, (1 - top - height) * this.height, width * this.width, height * this.height] as const;
+      const box = [
+        left * this.width,
+        (1 - top - height) * this.height,
+        width * this.width,
+        height * this.height,
+      ] as const;
       this.renderer.setViewport(...box);
       this.renderer.setScissor(...box);
       this.light(pane);
@@ -211,16 +311,23 @@ export class Picture {
   }
 
   // Dragging turns the view, unless it points.
-  set turns(value: boolean) { this.controls.enabled = value; }
+  set turns(value: boolean) {
+    this.controls.enabled = value;
+  }
 
-  // Returns where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
+  // Returns where a ray through a place of the canvas (0 to 1 from its upper left) meets the
+  // surface.
   pick(x: number, y: number): Vec3 | null {
     const hit = this.hit(x, y);
     return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
   }
   pickSurface(x: number, y: number): SurfacePlace | null {
-    const hit = this.hit(x, y), face = hit?.face, shares = hit?.barycoord;
-    return face && shares ? { corners: [face.a, face.b, face.c], shares: [shares.x, shares.y, shares.z] } : null;
+    const hit = this.hit(x, y),
+      face = hit?.face,
+      shares = hit?.barycoord;
+    return face && shares
+      ? { corners: [face.a, face.b, face.c], shares: [shares.x, shares.y, shares.z] }
+      : null;
   }
   // Where a place in the world lies on the canvas, in pixels of the page; null: behind the viewer.
   project(place: Vec3): [number, number] | null {
@@ -230,12 +337,18 @@ export class Picture {
   // From what project() gives, of the first view.
   private onCanvas(at: Vector3): [number, number] {
     const [left, top, width, height] = this.main.part;
-    return [(left + (at.x + 1) / 2 * width) * this.width, (top + (1 - at.y) / 2 * height) * this.height];
+    return [
+      (left + ((at.x + 1) / 2) * width) * this.width,
+      (top + ((1 - at.y) / 2) * height) * this.height,
+    ];
   }
   private hit(x: number, y: number): Intersection | undefined {
-    const ray = new Raycaster(), pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main, [u, v] = pane.inside(x, y);
+    const ray = new Raycaster(),
+      pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main,
+      [u, v] = pane.inside(x, y);
     ray.setFromCamera(new Vector2(u * 2 - 1, 1 - v * 2), pane.drawn);
-    const { geometry } = this.organ, { start, count } = geometry.drawRange;
+    const { geometry } = this.organ,
+      { start, count } = geometry.drawRange;
     geometry.computeBoundingSphere();
     geometry.setDrawRange(0, Infinity); // the mesh's surface is what is felt and drawn on
     const hit = ray.intersectObject(this.organ, false)[0];
@@ -245,7 +358,9 @@ export class Picture {
 
   private setQuality(quality: number): void {
     this.quality = quality;
-    const head = 'precision highp float;\nprecision highp sampler3D;\n' + (quality === 0 ? '#define FINE 1\n' : '');
+    const head =
+      'precision highp float;\nprecision highp sampler3D;\n' +
+      (quality === 0 ? '#define FINE 1\n' : '');
     this.organ.material.fragmentShader = head + lightingSource + organFragmentSource;
     this.organ.material.needsUpdate = true;
     this.fine.setHead(head);
@@ -263,7 +378,10 @@ export class Picture {
   }
 
   private box(): [Vector3, Vector3] {
-    const p = this.replica.rest(), low = new Vector3(1e9, 1e9, 1e9), high = new Vector3(-1e9, -1e9, -1e9), at = new Vector3();
+    const p = this.replica.rest(),
+      low = new Vector3(1e9, 1e9, 1e9),
+      high = new Vector3(-1e9, -1e9, -1e9),
+      at = new Vector3();
     for (let i = 0; i + 3 < p.length; i += 4) {
       at.set(p[i] ?? 0, p[i + 1] ?? 0, p[i + 2] ?? 0);
       low.min(at);
@@ -277,9 +395,14 @@ export class Picture {
   }
 
   private loadGeometry(): void {
-    const r = this.replica, n = r.vertexCount, g = this.organ.geometry;
+    const r = this.replica,
+      n = r.vertexCount,
+      g = this.organ.geometry;
     g.dispose();
-    for (const [name, size] of [['position', 3], ['normal', 3]] as const)
+    for (const [name, size] of [
+      ['position', 3],
+      ['normal', 3],
+    ] as const)
       g.setAttribute(name, dynamic(new BufferAttribute(new Float32Array(n * size), size)));
     g.setAttribute('lip', dynamic(new BufferAttribute(new Int8Array(n * 4), 4, true)));
     g.setAttribute('rest', new BufferAttribute(r.rest().slice(), 4));
@@ -290,7 +413,12 @@ export class Picture {
   }
   private loadPositions(): void {
     const g = this.organ.geometry;
-    for (const [name, values] of [['position', this.replica.positions()], ['normal', this.replica.normals()], ['lip', this.replica.lips()], ['overlay', this.replica.overlay()]] as const) {
+    for (const [name, values] of [
+      ['position', this.replica.positions()],
+      ['normal', this.replica.normals()],
+      ['lip', this.replica.lips()],
+      ['overlay', this.replica.overlay()],
+    ] as const) {
       const attribute = g.getAttribute(name) as BufferAttribute;
       attribute.array.set(values);
       attribute.needsUpdate = true;
@@ -301,16 +429,27 @@ export class Picture {
     const camera = pane.drawn;
     camera.updateMatrixWorld();
     this.scene.updateMatrixWorld();
-    const m = camera.matrixWorld.elements, u = this.uniforms;
+    const m = camera.matrixWorld.elements,
+      u = this.uniforms;
     const direction = (right: number, up: number, back: number): Vector3 =>
-      new Vector3(m[0], m[1], m[2]).multiplyScalar(right).addScaledVector(new Vector3(m[4], m[5], m[6]), up)
-        .addScaledVector(new Vector3(m[8], m[9], m[10]), back).normalize();
+      new Vector3(m[0], m[1], m[2])
+        .multiplyScalar(right)
+        .addScaledVector(new Vector3(m[4], m[5], m[6]), up)
+        .addScaledVector(new Vector3(m[8], m[9], m[10]), back)
+        .normalize();
     (u['eye']!.value as Vector3).copy(camera.position);
-    (u['key_direction']!.value as Vector3).copy(pane.isEndoscope ? direction(0.05, 0.12, 1) : direction(0.42, 0.88, 0.55));
+    (u['key_direction']!.value as Vector3).copy(
+      pane.isEndoscope ? direction(0.05, 0.12, 1) : direction(0.42, 0.88, 0.55),
+    );
     (u['fill_direction']!.value as Vector3).copy(direction(-0.9, 0.15, 0.35));
     const middle = camera.position.distanceTo(pane.target);
-    (u['haze']!.value as Vector2).set(...(pane.isEndoscope ? kScopeHaze : [middle, kHazePerMiddle / middle] as const));
-    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
+    (u['haze']!.value as Vector2).set(
+      ...(pane.isEndoscope ? kScopeHaze : ([middle, kHazePerMiddle / middle] as const)),
+    );
+    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(
+      camera.projectionMatrix,
+      camera.matrixWorldInverse,
+    );
   }
 }
 
@@ -321,7 +460,11 @@ function dynamic(attribute: BufferAttribute): BufferAttribute {
 
 // A browser says so before it makes a context, which takes long in software.
 function isSlow(): boolean {
-  return document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true }) === null;
+  return (
+    document
+      .createElement('canvas')
+      .getContext('webgl2', { failIfMajorPerformanceCaveat: true }) === null
+  );
 }
 
 function rendersInSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {

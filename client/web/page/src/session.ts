@@ -2,27 +2,62 @@
 // and comes back when the connection breaks.
 
 import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
-import { EnvelopeSchema, GoodbyeReason, LessonRequestSchema, MarkRequestSchema, PointRequestSchema, StrokeRequestSchema, TeachAction, TeachRequestSchema, Vec3Schema, ViewRequestSchema, type Envelope, type LessonAction, type MarkAction, type Participant } from './gen/proto/wire_pb';
+import {
+  EnvelopeSchema,
+  GoodbyeReason,
+  LessonRequestSchema,
+  MarkRequestSchema,
+  PointRequestSchema,
+  StrokeRequestSchema,
+  TeachAction,
+  TeachRequestSchema,
+  Vec3Schema,
+  ViewRequestSchema,
+  type Envelope,
+  type LessonAction,
+  type MarkAction,
+  type Participant,
+} from './gen/proto/wire_pb';
 import type { Link } from './link';
 import type { Replica, Vec3 } from './replica';
 
 export type State = 'joining' | 'live' | 'away' | 'ended';
-export interface View { eye: Vec3; target: Vec3 } // m
+export interface View {
+  eye: Vec3;
+  target: Vec3;
+} // m
 export interface Hooks {
   // Every message that is not of the surface; `tick` of the session when it came.
   onMessage(message: Envelope, tick: number): void;
   onChange(): void; // of `state` or `why`
 }
 
-const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
-// A server that is busy may take long to let somebody in, and one that has just begun may not hear yet.
-const kJoinSilenceMs = 15_000, kJoinTries = 4;
-// What the replica alone reads. Such messages are told by the numbers with which they begin, and not parsed.
+const kPingMs = 1000,
+  kSilenceMs = 4000,
+  kRoundTrips = 16;
+// A server that is busy may take long to let somebody in, and one that has just begun may not hear
+// yet.
+const kJoinSilenceMs = 15_000,
+  kJoinTries = 4;
+// What the replica alone reads. Such messages are told by the numbers with which they begin, and
+// not parsed.
 const kOfReplica: Envelope['message']['case'][] = [
-  'surfaceFrame', 'frameState', 'surfaceChange', 'surfaceTopology', 'surfaceSlice', 'frameStatePart', 'datagramProbe', 'hapticPatches',
-  'hapticLaw', 'pointEvent', 'drawing', 'fineSurfacePart',
+  'surfaceFrame',
+  'frameState',
+  'surfaceChange',
+  'surfaceTopology',
+  'surfaceSlice',
+  'frameStatePart',
+  'datagramProbe',
+  'hapticPatches',
+  'hapticLaw',
+  'pointEvent',
+  'drawing',
+  'fineSurfacePart',
 ];
-const kNumbersOfReplica = new Set(kOfReplica.map(name => EnvelopeSchema.fields.find(field => field.localName === name)?.number));
+const kNumbersOfReplica = new Set(
+  kOfReplica.map(name => EnvelopeSchema.fields.find(field => field.localName === name)?.number),
+);
 
 export class Session {
   state: State = 'joining';
@@ -43,7 +78,11 @@ export class Session {
   private joinTries = 0;
   private hasLeft = false;
 
-  constructor(private readonly link: Link, private readonly replica: Replica, private readonly hooks: Hooks) {
+  constructor(
+    private readonly link: Link,
+    private readonly replica: Replica,
+    private readonly hooks: Hooks,
+  ) {
     this.connect();
     this.timer = window.setInterval(() => this.tick(), kPingMs);
     window.addEventListener('pagehide', this.leave);
@@ -52,16 +91,23 @@ export class Session {
 
   // How old the newest frame is, in ms by the server's clock; nothing while that is unknown.
   get newestAgeMs(): number | null {
-    const published = this.replica.newestServerUs, offset = this.offset;
-    return published === 0 || offset === null ? null : (performance.now() * 1000 + offset - published) / 1000;
+    const published = this.replica.newestServerUs,
+      offset = this.offset;
+    return published === 0 || offset === null
+      ? null
+      : (performance.now() * 1000 + offset - published) / 1000;
   }
   // The same of what is shown, which follows the newest frame by a few.
   get shownAgeMs(): number | null {
     const age = this.newestAgeMs;
-    return age === null ? null : age + Math.max(0, this.replica.newestTick - this.replica.shownTick);
+    return age === null
+      ? null
+      : age + Math.max(0, this.replica.newestTick - this.replica.shownTick);
   }
   // Beyond this the picture is old: half a round trip, three frames and 250 ms.
-  get oldAfterMs(): number { return this.roundTripMs / 2 + 48 + 250; }
+  get oldAfterMs(): number {
+    return this.roundTripMs / 2 + 48 + 250;
+  }
 
   // Marks the organ, or returns it; `name`: of several marks.
   mark(action: MarkAction, name: string): void {
@@ -70,17 +116,38 @@ export class Session {
 
   // Shows everybody a place (m), or none any more.
   point(place: Vec3 | null): void {
-    const positionM = place === null ? {} : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
+    const positionM =
+      place === null
+        ? {}
+        : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
     this.say({ case: 'pointRequest', value: create(PointRequestSchema, positionM) });
   }
 
   // What an instructor does; `whom`: with whom, `text`: what the action needs.
   teach(action: TeachAction, whom: Participant | null = null, text = ''): void {
-    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action, text, participant: whom?.slot ?? 0, name: whom?.name ?? '' }) });
+    this.say({
+      case: 'teachRequest',
+      value: create(TeachRequestSchema, {
+        action,
+        text,
+        participant: whom?.slot ?? 0,
+        name: whom?.name ?? '',
+      }),
+    });
   }
   // One's tool and a free one of the receiver change hands, with what it holds.
   handOver(giver: Participant, tool: number, receiver: Participant): void {
-    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action: TeachAction.TEACH_HAND_OVER, participant: giver.slot, name: giver.name, tool, receiver: receiver.slot, receiverName: receiver.name }) });
+    this.say({
+      case: 'teachRequest',
+      value: create(TeachRequestSchema, {
+        action: TeachAction.TEACH_HAND_OVER,
+        participant: giver.slot,
+        name: giver.name,
+        tool,
+        receiver: receiver.slot,
+        receiverName: receiver.name,
+      }),
+    });
   }
   // Goes on in the lesson, or back to its beginning.
   lead(action: LessonAction): void {
@@ -88,16 +155,28 @@ export class Session {
   }
   // Lets simulated time go so fast, as a share of real time.
   slow(rate: number): void {
-    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action: TeachAction.TEACH_SLOW, rate }) });
+    this.say({
+      case: 'teachRequest',
+      value: create(TeachRequestSchema, { action: TeachAction.TEACH_SLOW, rate }),
+    });
   }
   // A line on the organ, or a piece of it.
   stroke(points: { triangle: number; weights: [number, number] }[]): void {
-    this.say({ case: 'strokeRequest', value: create(StrokeRequestSchema, { triangle: points.map(p => p.triangle), weight: points.flatMap(p => p.weights) }) });
+    this.say({
+      case: 'strokeRequest',
+      value: create(StrokeRequestSchema, {
+        triangle: points.map(p => p.triangle),
+        weight: points.flatMap(p => p.weights),
+      }),
+    });
   }
   // Where this person's view is, as who has the one to follow.
   view(eye: Vec3, target: Vec3): void {
     const place = (v: Vec3) => create(Vec3Schema, { x: v[0], y: v[1], z: v[2] });
-    this.say({ case: 'viewRequest', value: create(ViewRequestSchema, { eyeM: place(eye), targetM: place(target) }) });
+    this.say({
+      case: 'viewRequest',
+      value: create(ViewRequestSchema, { eyeM: place(eye), targetM: place(target) }),
+    });
   }
 
   leave = (): void => {
@@ -111,7 +190,10 @@ export class Session {
   };
 
   private get offset(): number | null {
-    const best = this.offsets.reduce<{ roundTrip: number; offset: number } | null>((a, b) => (a === null || b.roundTrip < a.roundTrip ? b : a), null);
+    const best = this.offsets.reduce<{ roundTrip: number; offset: number } | null>(
+      (a, b) => (a === null || b.roundTrip < a.roundTrip ? b : a),
+      null,
+    );
     return best === null ? null : best.offset;
   }
 
@@ -126,9 +208,12 @@ export class Session {
       socket.send(JSON.stringify({ code, name, role, session, token: this.token }));
     };
     socket.onmessage = event => {
-      if (socket === this.socket && event.data instanceof ArrayBuffer) this.take(new Uint8Array(event.data));
+      if (socket === this.socket && event.data instanceof ArrayBuffer)
+        this.take(new Uint8Array(event.data));
     };
-    socket.onclose = () => { if (socket === this.socket) this.lost('The connection broke.'); };
+    socket.onclose = () => {
+      if (socket === this.socket) this.lost('The connection broke.');
+    };
   }
 
   private take(bytes: Uint8Array): void {
@@ -151,7 +236,10 @@ export class Session {
       const roundTrip = now - Number(value.clientTimeUs) / 1000;
       this.roundTripMs = roundTrip;
       if (value.serverTimeUs > 0n) {
-        this.offsets.push({ roundTrip, offset: Number(value.serverTimeUs) - (now - roundTrip / 2) * 1000 });
+        this.offsets.push({
+          roundTrip,
+          offset: Number(value.serverTimeUs) - (now - roundTrip / 2) * 1000,
+        });
         if (this.offsets.length > kRoundTrips) this.offsets.shift();
       }
       return;
@@ -165,7 +253,10 @@ export class Session {
       this.ping();
     }
     if (kind === 'viewEvent' && value.eyeM && value.targetM) {
-      this.lastView = { eye: [value.eyeM.x, value.eyeM.y, value.eyeM.z], target: [value.targetM.x, value.targetM.y, value.targetM.z] };
+      this.lastView = {
+        eye: [value.eyeM.x, value.eyeM.y, value.eyeM.z],
+        target: [value.targetM.x, value.targetM.y, value.targetM.z],
+      };
       this.onView(this.lastView);
     }
     if (kind === 'goodbye') {
@@ -183,7 +274,8 @@ export class Session {
     this.socket = null;
     if (this.state === 'ended') return;
     if (this.state === 'joining') {
-      if (++this.joinTries >= kJoinTries) return this.end('The server does not answer: is it running, and is the link right?');
+      if (++this.joinTries >= kJoinTries)
+        return this.end('The server does not answer: is it running, and is the link right?');
       return this.retryLater();
     }
     const now = performance.now();
@@ -213,7 +305,13 @@ export class Session {
     if (this.state === 'live') this.ping();
   }
   private ping(): void {
-    this.say({ case: 'ping', value: { $typeName: 'trocar.proto.Ping', clientTimeUs: BigInt(Math.round(performance.now() * 1000)) } });
+    this.say({
+      case: 'ping',
+      value: {
+        $typeName: 'trocar.proto.Ping',
+        clientTimeUs: BigInt(Math.round(performance.now() * 1000)),
+      },
+    });
   }
   private say(message: Envelope['message']): void {
     const envelope = create(EnvelopeSchema);
@@ -223,7 +321,9 @@ export class Session {
   private send(bytes: Uint8Array): void {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(new Uint8Array(bytes));
   }
-  private end(why: string): void { if (this.state !== 'ended') this.set('ended', why); }
+  private end(why: string): void {
+    if (this.state !== 'ended') this.set('ended', why);
+  }
   private set(state: State, why: string): void {
     this.state = state;
     this.why = why;
