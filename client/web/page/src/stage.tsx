@@ -368,7 +368,7 @@ export function Stage(props: StageProps): JSX.Element {
           <button
             aria-pressed={points}
             onClick={() => setPoints(!points)}
-            title="Show everybody the place under the pointer (P)"
+            title="Show everybody the point under the pointer (P)"
           >
             Point
           </button>

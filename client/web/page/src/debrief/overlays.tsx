@@ -41,7 +41,7 @@ export function MeasurePanel(props: {
       <p role="status">{kind === 'off' ? '' : props.said}</p>
       {kind !== 'off' && count < kMostPlaces && (
         <p class="hint">
-          Click places on the organ. With keys: turn the organ, and Enter takes the place in the
+          Click points on the organ. With keys: turn the organ, and Enter takes the point in the
           middle of the picture.
         </p>
       )}
