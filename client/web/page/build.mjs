@@ -49,6 +49,8 @@ execFileSync(
     '--es_opt=target=ts',
     'proto/wire.proto',
     'proto/journal.proto',
+    'proto/organ.proto',
+    'proto/fine_surface.proto',
   ],
   { stdio: 'inherit' },
 );

@@ -76,8 +76,6 @@ export function RecordingList(props: { link: Link; onChoose(name: string): void 
   );
 }
 
-const kStageField = 62; // of Envelope
-
 interface DebriefProps {
   replica: Replica;
   recording: Recording;
@@ -113,7 +111,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
   useEffect(() => {
     try {
       replica.receiveBare(
-        kStageField,
+        'lessonStage',
         stage ? toBinary(LessonStageSchema, stage) : new Uint8Array(),
         performance.now(),
       );

@@ -28,7 +28,7 @@ export interface Label {
 }
 // The picture asks this for shapes and names, which it does not know.
 export interface Guide {
-  shapeOf(slot: number): Shape; // of a tool
+  shapeOf(slot: number): Shape; // a tool's
   labelOf(tool: Tool): Label;
   pointerLabel(participant: number): string;
 }
@@ -62,7 +62,7 @@ interface DrawnPointer {
 }
 
 export class Instruments {
-  head = ''; // of their shaders
+  head = ''; // begins their shaders
   private readonly drawnTools = new Map<number, DrawnTool>();
   private readonly drawnPointers = new Map<number, DrawnPointer>();
   private drawing: Mesh | null = null;

@@ -6,11 +6,11 @@ export interface Link {
   name: string;
   session: string; // "HOST:PORT" of one of several; empty: the first
   recordingsKey: string;
-  file: string; // of the recordings
+  file: string; // one of the recordings
   seconds: number | null; // where in it to begin
   view: View | null;
   speed: number | null;
-  bookmarks: string; // to be read by readBookmarks; empty: none
+  bookmarks: string; // readBookmarks reads them; empty: none
 }
 
 // From where the picture is seen, m.

@@ -6,8 +6,7 @@ import { kDamaged, type Item, type Recording } from './recording';
 import type { Replica } from './replica';
 
 export const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
-const kAheadItems = 400,
-  kParticipantsField = 19;
+const kAheadItems = 400;
 
 export class Player {
   tick: number;
@@ -124,8 +123,8 @@ export class Player {
   }
 
   private feed(item: Item): void {
-    if (item.field === kParticipantsField) this.people = fromBinary(ParticipantsSchema, item.data);
-    if (item.field !== 0) this.replica.receiveBare(item.field, item.data, performance.now());
+    if (item.name === 'participants') this.people = fromBinary(ParticipantsSchema, item.data);
+    if (item.name) this.replica.receiveBare(item.name, item.data, performance.now());
     this.replica.takeOutbox(); // a recording answers nobody
     this.onItem(item);
   }

@@ -5,6 +5,7 @@ import { fromBinary, toBinary } from '@bufbuild/protobuf';
 import { BinaryReader, WireType } from '@bufbuild/protobuf/wire';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
+import type { MessageName } from './envelope';
 import {
   ClaimLogSchema,
   JournalGapSchema,
@@ -13,6 +14,7 @@ import {
   type JournalGap,
   type Overview,
 } from './gen/proto/journal_pb';
+import { OrganSchema } from './gen/proto/organ_pb';
 import {
   ClaimOutcome,
   ParticipantsSchema,
@@ -113,7 +115,7 @@ export function ofFile(file: Blob): Bytes {
 }
 
 export interface Item {
-  field: number;
+  name: MessageName | null; // the field of Envelope that it would be; null: there is none
   tick: number;
   topic: string;
   data: Uint8Array;
@@ -126,19 +128,18 @@ export interface RecordedEvent {
   text: string;
 }
 
-// Fields of Envelope, by channel.
-const kFields: Record<string, number> = {
-  '/surface/key': 2,
-  '/surface/delta': 2,
-  '/frame_state': 3,
-  '/topology/change': 8,
-  '/topology': 18,
-  '/participants': 19,
-  '/drawing': 40,
+// The fields of Envelope for messages of a channel.
+const kFields: Record<string, MessageName> = {
+  '/surface/key': 'surfaceFrame',
+  '/surface/delta': 'surfaceFrame',
+  '/frame_state': 'frameState',
+  '/topology/change': 'surfaceChange',
+  '/topology': 'surfaceTopology',
+  '/participants': 'participants',
+  '/drawing': 'drawing',
 };
 const kEventTopics = ['/participants', '/claims', '/topology/change', '/gap', '/lesson'],
   kMostEvents = 5000;
-const kFineSurfaceField = 16; // of Organ (proto/organ.proto)
 // Ticks after which a cut is another one; an overview names one tick a second.
 const kCutPause = 1500;
 const kShown = [
@@ -215,7 +216,7 @@ export class Recording {
   private item(m: Message): Item {
     const topic = this.topic(m);
     return {
-      field: kFields[topic] ?? 0,
+      name: kFields[topic] ?? null,
       tick: Number((m.logTime - this.startNs) / 1_000_000n),
       topic,
       data: m.data,
@@ -242,7 +243,7 @@ export class Recording {
     if (!key) return out;
     out.push(
       (await this.last('/drawing', tick)) ?? {
-        field: 40,
+        name: 'drawing',
         tick: key.tick,
         topic: '/drawing',
         data: kNothingDrawn,
@@ -260,7 +261,7 @@ export class Recording {
       endTime: this.time(tick),
     })) {
       const item = this.item(m);
-      const isOfSurface = item.field === 2 || item.field === 8;
+      const isOfSurface = item.name === 'surfaceFrame' || item.name === 'surfaceChange';
       if (!isOfSurface || item.tick > key.tick) out.push(item);
     }
     return out;
@@ -287,7 +288,7 @@ export class Recording {
     const { entry } = fromBinary(LessonRecordSchema, m.data);
     if (entry.case === 'point')
       yield {
-        field: 36,
+        name: 'pointEvent',
         tick: this.item(m).tick,
         topic: '/point',
         data: toBinary(PointEventSchema, entry.value),
@@ -297,7 +298,9 @@ export class Recording {
   async fineSurface(): Promise<Uint8Array | null> {
     if (this.protocolMinor < 21) return null;
     const organ = await this.last('/organ', this.firstTick);
-    return organ && organ.data.length <= kMostChunk ? fieldIn(organ.data, kFineSurfaceField) : null;
+    return organ && organ.data.length <= kMostChunk
+      ? fieldIn(organ.data, OrganSchema.field.fineSurface!.number)
+      : null;
   }
   // The overview, a message at a time; nothing in recordings that have none. It is small parts of
   // the file: an hour takes about a megabyte.
@@ -353,7 +356,7 @@ function readOverview(data: Uint8Array): Overview {
 // What is known is not added again.
 export class EventLog {
   readonly events: RecordedEvent[] = [];
-  readonly stages: { tick: number; stage: LessonStage }[] = []; // of a lesson, by tick
+  readonly stages: { tick: number; stage: LessonStage }[] = []; // a lesson's stages, by tick
   readonly names = new Map<number, string>(); // by a participant's slot: the newest
   private readonly known = new Set<string>();
   private people: Participants | null = null;

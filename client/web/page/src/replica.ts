@@ -1,6 +1,8 @@
 // The native client's replica as a WebAssembly module (client/web/wasm): messages go in, arrays to
 // draw come out. Views of the module's memory hold until the next call of any function here.
 
+import { numberOf, type MessageName } from './envelope';
+
 interface Exports {
   memory: WebAssembly.Memory;
   _initialize(): void;
@@ -103,7 +105,7 @@ export interface Tool {
   tip: Vec3; // m, where the tissue lets it be
   orientation: [number, number, number, number];
   hand: Vec3; // m, where the hand has it
-  forceN: Vec3; // of the tissue on the tool
+  forceN: Vec3; // the tissue's force on the tool
   torqueNm: Vec3;
   penetrationM: number;
 }
@@ -139,7 +141,7 @@ export interface Blood {
   openVessels: number;
 }
 
-// The view of who sees with a tool: metres and unit vectors in the world.
+// The view of a person who sees with a tool: metres and unit vectors in the world.
 export interface Lens {
   eye: Vec3;
   forward: Vec3;
@@ -202,10 +204,10 @@ export class Replica {
     this.put(envelope);
     if (!this.e.receive(envelope.length, nowMs)) throw new Error(this.error());
   }
-  // A message as a recording has it; `field`: its number in Envelope.
-  receiveBare(field: number, message: Uint8Array, nowMs: number): void {
+  // A message as a recording has it, by the name of its field in Envelope.
+  receiveBare(name: MessageName, message: Uint8Array, nowMs: number): void {
     this.put(message);
-    if (!this.e.receive_bare(field, message.length, nowMs)) throw new Error(this.error());
+    if (!this.e.receive_bare(numberOf(name), message.length, nowMs)) throw new Error(this.error());
   }
   // A FineSurface as a recording's organ has it. If it cannot be drawn, fineFault says why.
   receiveFineSurface(message: Uint8Array): void {

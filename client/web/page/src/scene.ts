@@ -36,8 +36,8 @@ export interface SurfacePlace {
 }
 const kNoise = 64;
 const kHazePerMiddle = 0.55,
-  kScopeHaze: [number, number] = [0.05, 4]; // as in the native picture
-const kPitch = 0.42; // of the views at the start: from the front, a side, the back, and above
+  kScopeHaze: [number, number] = [0.05, 4]; // the native picture's
+const kPitch = 0.42; // views begin at the front, a side, the back, and above
 const kStarts: [number, number][] = [
   [0, kPitch],
   [Math.PI / 2, kPitch],
@@ -52,16 +52,16 @@ export class Picture {
   showsArrows = true;
   // The person moves a view, so that it follows nobody.
   onLetGo: (view: number) => void = () => undefined;
-  onTurn: () => void = () => undefined; // likewise of the first, whatever it follows
+  onTurn: () => void = () => undefined; // the person moves the first view, whatever it follows
   onActive: (view: number) => void = () => undefined; // another one is moved from now on
   pictures = 0;
-  drawMs = 0; // of the last picture
+  drawMs = 0; // the last picture took so long
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly controls: OrbitControls;
   private readonly panes = kStarts.map(([yaw, pitch]) => new Pane(yaw, pitch));
   private count: ViewCount = 1;
-  private active = 0; // of the views: which one mouse and keys move
+  private active = 0; // the view that mouse and keys move
   private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly fine: FineLayer;
   private readonly field: Field;

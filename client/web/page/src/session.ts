@@ -18,6 +18,7 @@ import {
   type MarkAction,
   type Participant,
 } from './gen/proto/wire_pb';
+import { firstNumber, numberOf, type MessageName } from './envelope';
 import type { Link } from './link';
 import type { Replica, Vec3 } from './replica';
 
@@ -29,7 +30,7 @@ export interface View {
 export interface Hooks {
   // Every message that is not of the surface; `tick` of the session when it came.
   onMessage(message: Envelope, tick: number): void;
-  onChange(): void; // of `state` or `why`
+  onChange(): void; // `state` or `why` has changed
 }
 
 const kPingMs = 1000,
@@ -39,9 +40,8 @@ const kPingMs = 1000,
 // yet.
 const kJoinSilenceMs = 15_000,
   kJoinTries = 4;
-// What the replica alone reads. Such messages are told by the numbers with which they begin, and
-// not parsed.
-const kOfReplica: Envelope['message']['case'][] = [
+// What the replica alone reads: the page does not parse such messages.
+const kOfReplica: MessageName[] = [
   'surfaceFrame',
   'frameState',
   'surfaceChange',
@@ -55,9 +55,7 @@ const kOfReplica: Envelope['message']['case'][] = [
   'drawing',
   'fineSurfacePart',
 ];
-const kNumbersOfReplica = new Set(
-  kOfReplica.map(name => EnvelopeSchema.fields.find(field => field.localName === name)?.number),
-);
+const kNumbersOfReplica = new Set(kOfReplica.map(numberOf));
 
 export class Session {
   state: State = 'joining';
@@ -66,7 +64,7 @@ export class Session {
   bytes = 0;
   roundTripMs = 0;
   awaySince = 0;
-  lastView: View | null = null; // of who has the view to follow
+  lastView: View | null = null; // the view to follow
   onView: (view: View) => void = () => undefined;
   private keepSeconds = 0;
   private socket: WebSocket | null = null;
@@ -97,7 +95,7 @@ export class Session {
       ? null
       : (performance.now() * 1000 + offset - published) / 1000;
   }
-  // The same of what is shown, which follows the newest frame by a few.
+  // The same for the picture that is shown, some frames after the newest.
   get shownAgeMs(): number | null {
     const age = this.newestAgeMs;
     return age === null
@@ -114,7 +112,7 @@ export class Session {
     this.say({ case: 'markRequest', value: create(MarkRequestSchema, { action, name }) });
   }
 
-  // Shows everybody a place (m), or none any more.
+  // Shows everybody a point (m), or none any more.
   point(place: Vec3 | null): void {
     const positionM =
       place === null
@@ -170,7 +168,7 @@ export class Session {
       }),
     });
   }
-  // Where this person's view is, as who has the one to follow.
+  // Where this person's view is, which others follow.
   view(eye: Vec3, target: Vec3): void {
     const place = (v: Vec3) => create(Vec3Schema, { x: v[0], y: v[1], z: v[2] });
     this.say({
@@ -223,7 +221,8 @@ export class Session {
     try {
       this.replica.receive(bytes, now);
       for (const answer of this.replica.takeOutbox()) this.send(answer);
-      if (!kNumbersOfReplica.has(fieldOf(bytes))) this.heed(fromBinary(EnvelopeSchema, bytes), now);
+      if (!kNumbersOfReplica.has(firstNumber(bytes)))
+        this.heed(fromBinary(EnvelopeSchema, bytes), now);
     } catch (error) {
       this.end(`This page cannot go on: ${error instanceof Error ? error.message : String(error)}`);
       this.socket?.close(1000);
@@ -260,7 +259,7 @@ export class Session {
       this.onView(this.lastView);
     }
     if (kind === 'goodbye') {
-      // A place that hangs from the connection before is free in a moment.
+      // A seat that hangs on the connection before is free in a moment.
       const comesBack = this.state === 'away' && value.reason === GoodbyeReason.GOODBYE_TIMEOUT;
       if (!comesBack) {
         this.refusal = value.reason;
@@ -299,7 +298,7 @@ export class Session {
     if (performance.now() - this.heardMs > patience && this.state !== 'ended') {
       const silent = this.socket;
       this.lost('Nothing has come for too long.');
-      silent.close(4000); // not in order: the session keeps the place
+      silent.close(4000); // not in order: the session keeps the seat
       return;
     }
     if (this.state === 'live') this.ping();
@@ -329,10 +328,4 @@ export class Session {
     this.why = why;
     this.hooks.onChange();
   }
-}
-
-// The number of the field with which an Envelope begins.
-function fieldOf(bytes: Uint8Array): number {
-  const first = bytes[0] ?? 0;
-  return first < 0x80 ? first >> 3 : ((first & 0x7f) | ((bytes[1] ?? 0) << 7)) >> 3;
 }

@@ -16,10 +16,10 @@ import { save } from './save';
 interface Props {
   marks: Bookmark[];
   now: number; // tick
-  name: string; // of the recording
+  name: string; // the recording's
   onChange(marks: Bookmark[]): void;
   onSeek(tick: number): void;
-  onCopy: ((marks: Bookmark[]) => void) | null; // as a link; null: this recording has none
+  onCopy: ((marks: Bookmark[]) => void) | null; // copies a link; null: this recording has none
 }
 
 export function Bookmarks(props: Props): JSX.Element {

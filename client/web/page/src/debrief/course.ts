@@ -6,7 +6,7 @@ import type { FrameState, Vec3 as WireVec3 } from '../gen/proto/wire_pb';
 import { kBadOverview } from '../recording';
 import { Verb, type Vec3 } from '../replica';
 
-export const kBinTicks = 256; // as overviews have it
+export const kBinTicks = 256; // overviews have the same
 const kFrameGap = 64,
   kHasClaim = 8,
   kMostBins = 120;

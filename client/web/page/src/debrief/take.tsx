@@ -11,7 +11,7 @@ const kClipKinds = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/web
 const kNoClip = 'This browser cannot record clips: it has no WebM.';
 
 interface Props {
-  name: string; // of the recording
+  name: string; // the recording's
   isWhole: boolean; // the tables hold all of it
   still: Still;
   forces(): string; // tables
