@@ -240,7 +240,7 @@ void Server::restore_people() {
   }
   for (const auto slot : start_.unnamed_hands) leave(slot);
   if (!start_.participants.empty())
-    log::info("{} of {} participants may come back to their places for {} s", restored,
+    log::info("{} of {} participants may come back to their seats for {} s", restored,
               start_.participants.size(), options_.access.return_seconds);
 }
 

@@ -12,7 +12,7 @@ bool Replicator::keep_place(Client& client) {
   const auto& participant = *client.participant;
   const auto slot = participant.slot;
   if (!absences_.begin(slot, options_.clock_ns())) return false;
-  log::info("{} ({}) has lost the connection, the place is kept for {} s", participant.name,
+  log::info("{} ({}) has lost the connection, the seat is kept for {} s", participant.name,
             participants::name_of(participant.role), absences_.kept_seconds());
   ++counters_.lost;
   if (options_.gate) options_.gate->note_action(client.applicant, "lost");
