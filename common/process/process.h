@@ -28,9 +28,9 @@ struct Command {
   std::vector<std::string> words;
   // Descriptors of ours that become its streams; kNothing: /dev/null.
   int in = kNothing, out = kNothing, errors = kNothing;
-  int more = kNothing;          // a descriptor of ours that becomes its descriptor 3
-  std::filesystem::path log{};  // takes output and errors at its end, of mode 0600; empty: none
-  bool is_apart = false;        // in a session of its own, which our terminal does not end
+  int more = kNothing;        // a descriptor of ours that becomes its descriptor 3
+  std::filesystem::path log;  // takes output and errors at its end, of mode 0600; empty: none
+  bool is_apart = false;      // in a session of its own, which our terminal does not end
 };
 
 struct Ending {
