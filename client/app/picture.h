@@ -42,17 +42,7 @@ class Picture {
  private:
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
 
-  void measure(const replica::Replica& replica, std::uint64_t now_ns);
-  static std::vector<ui::HudParticipant> participants_of(const replica::Replica& replica,
-                                                         const Pane& pane, bool is_replay);
-  void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
-  void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
-  void load_lesson_image(const replica::Replica& replica);
-  void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
-  static void lead(const ui::HudActions& actions, replica::SessionSource& source);
-  static void add_messages(const replica::Replica& replica, std::uint64_t now_ns,
-                           ui::HudModel& model);
   ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
                          Hands& hands, std::uint64_t now_ns) const;
   // Follows the view of who has it, if the person wants to, or says where one's own is.
@@ -60,7 +50,6 @@ class Picture {
                   const device::PointerInput& input);
   void move_mouse_tool(const replica::Replica& replica, Hands& hands,
                        const device::PointerInput& input, float seconds);
-  void add_lent_view(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   // Takes the click that measures out of the input.
   void take_measure(const replica::Replica& replica, device::PointerInput& input);
   void add_measure(ui::HudModel& model) const;
@@ -83,6 +72,15 @@ class Picture {
   struct Rate {  // over the last second
     std::uint64_t start_ns = 0, pictures = 0, frames = 0, bytes = 0;
     double pictures_per_second = 0, frames_per_second = 0, bytes_per_second = 0;
+
+    void measure(const replica::ReplicaCounters& counters, std::uint64_t count,
+                 std::uint64_t now_ns);
+  };
+  struct LessonImage {
+    render::ImageTexture texture;
+    std::string file;  // that it was made from
+
+    void load(const replica::Replica& replica);
   };
 
   replica::Role role_;
@@ -109,9 +107,8 @@ class Picture {
   bool follows_view_ = false;
   std::uint64_t view_sent_ns_ = 0;
   Rate rate_;
-  render::ImageTexture lesson_image_;
-  std::string lesson_image_file_;  // that it was made from
-  Background saving_;              // writes screenshots
+  LessonImage lesson_image_;
+  Background saving_;  // writes screenshots
 };
 
 }  // namespace trocar::app

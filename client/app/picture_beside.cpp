@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "client/app/hud_content.h"
 #include "client/app/picture.h"
 
 namespace trocar::app {

@@ -27,6 +27,7 @@ namespace trocar::tool {
   throw std::runtime_error("a [header] is damaged");
 }
 }  // namespace trocar::tool
+#pragma push_macro("NDEBUG")
 #undef NDEBUG
 #define TOML_ASSERT(expression) ((expression) ? void() : ::trocar::tool::refuse_toml())
 #define TOML_HEADER_ONLY 1
@@ -42,6 +43,7 @@ namespace trocar::tool {
 #undef TOML_UNREACHABLE
 #define TOML_UNREACHABLE __builtin_unreachable()
 #include <toml++/toml.h>
+#pragma pop_macro("NDEBUG")
 #pragma GCC diagnostic pop
 
 namespace trocar::tool {

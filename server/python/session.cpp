@@ -5,13 +5,12 @@
 #include "server/python/arrays.h"
 #include "server/python/errors.h"
 #include "server/tissue/contact/proxies.h"
+#include "server/tissue/hands/sampling.h"
 
 namespace trocar::python {
 namespace {
 
 namespace py = pybind11;
-
-constexpr Tick kSampleTicks = 8;  // as hands do it in a session
 
 class Flag {
  public:
@@ -105,7 +104,7 @@ void Session::leave(ParticipantSlot hand) {
 void Session::gather_inputs() {
   inputs_ = next_;
   next_.clear();
-  if (simulation_.current_tick() % kSampleTicks != 0) return;
+  if (!hands::takes_samples(simulation_.current_tick() + 1)) return;
   for (int slot = 0; slot < kMaxTools; ++slot) {
     const ToolSlot tool{static_cast<std::uint8_t>(slot)};
     const auto& known = simulation_.state().tools[tool];

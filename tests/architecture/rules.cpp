@@ -201,6 +201,16 @@ Breaches check_net_sees_no_world(const SourceTree& tree) {
   return breaches;
 }
 
+Breaches check_sessions_see_no_tool(const SourceTree& tree) {
+  Breaches breaches;
+  for (const auto& layer : tree.layers)
+    for (const auto& seen : tree.closure_of(layer))
+      if (!tree.offline.contains(layer) && tree.offline.contains(seen))
+        breaches.push_back(layer + "/CMakeLists.txt:1: links " + seen +
+                           ", perhaps through others: give it an interface of its own");
+  return breaches;
+}
+
 Breaches check_protobuf(const SourceTree& tree) {
   return matching_includes(
       tree, std::regex("\\.pb\\.h$|^google/protobuf/"), kProtobufFolders,

@@ -25,6 +25,8 @@ Breaches check_includes(const SourceTree& tree);
 Breaches check_dependencies(const SourceTree& tree);
 // server/session/net moves bytes: it links nothing else of the server, not even through others.
 Breaches check_net_sees_no_world(const SourceTree& tree);
+// No folder links one of TROCAR_OFFLINE_FOLDERS, not even through others, unless it is one itself.
+Breaches check_sessions_see_no_tool(const SourceTree& tree);
 // Generated messages only where bytes become meaning.
 Breaches check_protobuf(const SourceTree& tree);
 // OpenGL, GLFW, EGL and Dear ImGui only in the folders that draw.

@@ -79,9 +79,10 @@ class Rules : public ::testing::Test {
 
 TEST_F(Rules, AGoodTreeHasNoBreach) {
   const auto good = tree();
-  for (const auto& breaches : {check_folders(good), check_includes(good), check_dependencies(good),
-                               check_net_sees_no_world(good), check_protobuf(good),
-                               check_graphics(good), check_determinism(good), check_files(good)})
+  for (const auto& breaches :
+       {check_folders(good), check_includes(good), check_dependencies(good),
+        check_net_sees_no_world(good), check_protobuf(good), check_sessions_see_no_tool(good),
+        check_graphics(good), check_determinism(good), check_files(good)})
     EXPECT_TRUE(breaches.empty()) << breaches.front();
 }
 
@@ -205,6 +206,15 @@ TEST_F(Rules, NetThatLinksTheWorldThroughAnotherFolderIsFound) {
   library("server/session/net", "SOURCES n.cpp USES common/wire");
   expect_one(check_net_sees_no_world(tree()), "server/session/net/CMakeLists.txt:1: ",
              "server/tissue/world, perhaps through others");
+}
+
+TEST_F(Rules, AToolThatASessionSeesIsFound) {
+  append("CMakeLists.txt", "set(TROCAR_OFFLINE_FOLDERS common/math server/tissue/world)\n");
+  const auto breaches = check_sessions_see_no_tool(tree());
+  ASSERT_EQ(breaches.size(), 2u) << "wire, and net through it";
+  EXPECT_EQ(breaches[0],
+            "common/wire/CMakeLists.txt:1: links common/math, perhaps through others: "
+            "give it an interface of its own");
 }
 
 TEST_F(Rules, TheTableOfFoldersFollowsTheLayers) {

@@ -147,6 +147,7 @@ SourceTree read_source_tree(const std::filesystem::path& root) {
   tree.layers = read_list(top, "TROCAR_LAYERS");
   for (const auto& folder : read_list(top, "TROCAR_STATE_FOLDERS"))
     tree.state_folders.insert(folder);
+  for (const auto& folder : read_list(top, "TROCAR_OFFLINE_FOLDERS")) tree.offline.insert(folder);
   for (auto it = fs::recursive_directory_iterator(root); it != fs::recursive_directory_iterator();
        ++it) {
     if (it->is_directory() && is_left_out(it->path())) it.disable_recursion_pending();

@@ -51,6 +51,7 @@ struct Folder {
 struct SourceTree {
   std::vector<std::string> layers;      // TROCAR_LAYERS, top first
   std::set<std::string> state_folders;  // TROCAR_STATE_FOLDERS
+  std::set<std::string> offline;        // TROCAR_OFFLINE_FOLDERS
   std::map<std::string, Folder> folders;
   std::vector<SourceFile> files;  // by path
 

@@ -23,13 +23,13 @@
 #include "server/organs/catalogue/load_organ.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
+#include "server/tissue/hands/sampling.h"
 
 namespace trocar {
 namespace {
 
 constexpr const char* kProgram = "bench_hands";
 constexpr int kBuiltInTets = 88'000;
-constexpr Tick kSampleTicks = 8;
 constexpr double kToolRadius_m = 0.008;
 // One press, before all others, finds the force and the rounding that the tolerance follows from.
 constexpr double kPilotDepth_m = 0.012;
@@ -157,7 +157,7 @@ class Session {
   void run() {
     const auto ticks = static_cast<Tick>(options_.seconds * 1e3);
     for (Tick tick = 1; tick <= ticks; ++tick) {
-      if (tick % kSampleTicks == 1)
+      if (hands::takes_samples(tick))
         for (std::uint8_t hand = 0; hand < hands_.size(); ++hand)
           inputs_.samples.push_back(sample_of(hands_[hand], hand, tick));
       one_tick();

@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "common/base/assert.h"
+#include "server/tissue/hands/sampling.h"
 
 namespace trocar::bench {
 namespace {
 
-constexpr Tick kSampleTicks = 8;
 constexpr float kRampTicks = 150;
 
 ToolSlot slot(std::size_t i) {
@@ -47,7 +47,7 @@ OurSession::OurSession(organ::Organ organ, std::span<const BenchTool> tools,
 // compared.
 void OurSession::sample_tools() {
   const Tick tick = simulation_.current_tick();
-  if (tick % kSampleTicks != 0) return;
+  if (!hands::takes_samples(tick + 1)) return;
   for (std::size_t i = 0; i < tools_.size(); ++i) {
     const BenchTool& tool = tools_[i];
     const float t = static_cast<float>(tick + 37 * i) * 4e-3f;

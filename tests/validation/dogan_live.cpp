@@ -12,6 +12,7 @@
 #include "common/base/timing.h"
 #include "server/lab/calibration/places.h"
 #include "server/session/control/rate_controller.h"
+#include "server/tissue/hands/sampling.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measure.h"
@@ -29,7 +30,6 @@ constexpr double kPlainOnRecord = 0.015;
 // Averaged strain misses it by little in the small liver, by the force.
 constexpr double kAveragedForceOnRecord = 0.0125;
 constexpr float kToolRadius_m = 0.008f, kDeep_m = 0.010f, kAbove_m = 0.003f;
-constexpr Tick kSampleTicks = 8;
 constexpr std::uint64_t kLiveSeed = 2011;
 // Below this share of the largest force the tool has hardly met the tissue.
 constexpr double kLeastShare = 0.05;
@@ -94,7 +94,7 @@ class LiveHand {
     inputs.joins.push_back(join);
     LiveCourse course;
     for (Tick tick = 1; tick <= ticks_; ++tick) {
-      if (tick % kSampleTicks == 1) inputs.samples.push_back(sample_at(tick));
+      if (hands::takes_samples(tick)) inputs.samples.push_back(sample_at(tick));
       const auto decisions = controller ? controller->decisions() : decide(tick);
       const auto begin = thread_cpu_ns();
       const auto& report = simulation.tick(inputs, decisions);

@@ -8,14 +8,13 @@
 #include "server/lab/scenario/relaxed_organ.h"
 #include "server/tissue/contact/contact_list.h"
 #include "server/tissue/dynamics/relaxation.h"
+#include "server/tissue/hands/sampling.h"
 
 namespace trocar::scenario {
 namespace {
 
 using scenario::kAllAxes;
 
-// A hand reads its devices this often, in a session as here.
-constexpr Tick kSampleTicks = 8;
 // A paper's subdivision gets a patch of this many mean edges at a time: shorter ones pull the same
 // nodes again and again.
 constexpr double kPatchEdges = 1;
@@ -236,7 +235,7 @@ void ScenarioRun::sample_tools(Tick tick, double time_s, bool has_samples) {
 StepReport ScenarioRun::step_dynamic() {
   if (explicit_) return step_explicit();
   const Tick before = simulation_.current_tick();
-  sample_tools(before + 1, seconds_of(before), before % kSampleTicks == 0);
+  sample_tools(before + 1, seconds_of(before), hands::takes_samples(before + 1));
   const auto& tick = simulation_.tick(inputs_, decisions_);
   StepReport report;
   report.active_nodes = tick.near.active_nodes;

@@ -125,11 +125,8 @@ template <typename Neighbours, typename Length>
 void SelfSurface::reach(std::span<const Site> from, double near_m, Neighbours&& neighbours,
                         Length&& length_between) {
   reached_.assign(from.begin(), from.end());
-  if (++seen_current_ == 0) {
-    std::ranges::fill(seen_, 0u);
-    seen_current_ = 1;
-  }
-  for (const Site s : from) seen_[s] = seen_current_, paths_[s] = 0;
+  seen_.begin();
+  for (const Site s : from) seen_.insert(s), paths_[s] = 0;
   rim_.clear();
   for (const Site s : from) rim_.push_back({s, 0});
   for (std::uint32_t layer = 1; !rim_.empty() && layer <= kMostNearLayers; ++layer) {
@@ -137,13 +134,11 @@ void SelfSurface::reach(std::span<const Site> from, double near_m, Neighbours&& 
     for (const Step& step : rim_)
       neighbours(step.site, [&](Site next) {
         const double path = step.path + length_between(step.site, next);
-        const bool is_new = seen_[next] != seen_current_;
+        const bool is_new = !seen_.has(next);
         if ((layer > kNearLayers && path > near_m) || !(is_new || path < paths_[next])) return;
         paths_[next] = path;
         next_rim_.push_back({next, path});
-        if (!is_new) return;
-        seen_[next] = seen_current_;
-        reached_.push_back(next);
+        if (seen_.insert(next)) reached_.push_back(next);
       });
     std::swap(rim_, next_rim_);
   }

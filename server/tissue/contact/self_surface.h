@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "common/base/blocks.h"
+#include "common/base/stamps.h"
 #include "server/organs/mesh/csr.h"
 #include "server/organs/organ/organ.h"
 #include "server/tissue/topology/edit.h"
@@ -147,8 +148,7 @@ class SelfSurface {
   Blocks<Site> near_now_;
   std::vector<Site> updated_;
   // Scratch of reach().
-  std::vector<std::uint32_t> seen_;
-  std::uint32_t seen_current_ = 0;
+  Stamps seen_;
   std::vector<double> paths_;
   std::vector<Site> reached_;
   // The path is that of so many edges, whatever a longer chain of shorter ones comes to.

@@ -257,12 +257,10 @@ void Relaxation::list_due(std::span<const GroupLanes> nodes, std::uint8_t step) 
   const auto tets = static_cast<std::uint32_t>(blocks_.size());
   const auto all =
       tets + static_cast<std::uint32_t>(nodal_relaxation_ ? nodal_relaxation_->block_count() : 0);
-  due_stamp_.resize(all);
-  if (++current_ == 0) std::ranges::fill(due_stamp_, 0u), current_ = 1;
+  is_due_.resize(all);
+  is_due_.begin();
   const auto add = [&](std::uint32_t block) {
-    if (due_stamp_[block] == current_) return;
-    due_stamp_[block] = current_;
-    due_.push_back(block);
+    if (is_due_.insert(block)) due_.push_back(block);
   };
   for (const auto group_lanes : nodes)
     for (std::size_t lane = 0; lane < kLanes; ++lane) {

@@ -27,6 +27,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/base/stamps.h"
 #include "common/base/workers.h"
 #include "common/wire/figures.h"
 #include "server/tissue/dynamics/nodal_relaxation.h"
@@ -134,10 +135,9 @@ class Relaxation {
   static constexpr std::uint32_t kRun = 4;  // blocks, or groups, whose turn comes together
   std::uint32_t turns_ = 1;                 // steps from one turn to the next
   std::vector<std::vector<std::uint32_t>> blocks_of_;  // per slot: of tets at its node
-  std::vector<std::uint32_t> due_,
-      due_stamp_;  // blocks of tets, then of smoothing domains; per block
-  std::uint32_t current_ = 0;
-  std::vector<Loads> loads_;  // per tet, after zeros
+  std::vector<std::uint32_t> due_;                     // blocks of tets, then of smoothing domains
+  Stamps is_due_;                                      // per block
+  std::vector<Loads> loads_;                           // per tet, after zeros
   bool is_stale_ = true;
   std::vector<std::uint32_t> stale_;                       // blocks, unless is_stale_
   std::vector<TetIndex> tets_;                             // while it follows

@@ -8,40 +8,42 @@ namespace trocar::pieces {
 
 using world::NodeClass;
 
+void PieceList::begin_search(const topology::Topology& topology) {
+  seen_.resize(topology.node_count());
+  held_.resize(topology.node_count());
+  tets_seen_.resize(topology.tet_count());
+  for (auto* stamps : {&seen_, &held_, &tets_seen_}) stamps->begin();
+}
+
 // Searches from a node into found_, until it is known that the body has it; false: found_ is all
 // of a piece.
 bool PieceList::reaches_body(const topology::Topology& topology, const world::World& world,
                              NodeIndex from) {
   found_.assign(1, from);
-  seen_[from.value] = current_;
+  seen_.insert(from.value);
   bool is_held = world.node_classes[from.value] == NodeClass::Fixed;
   const auto visit = [&](NodeIndex node) {
-    is_held |= world.node_classes[node.value] == NodeClass::Fixed || held_[node.value] == current_;
-    if (seen_[node.value] == current_) return;
-    seen_[node.value] = current_;
-    found_.push_back(node);
+    is_held |= world.node_classes[node.value] == NodeClass::Fixed || held_.has(node.value);
+    if (seen_.insert(node.value)) found_.push_back(node);
   };
   for (std::size_t i = 0; i < found_.size() && !is_held; ++i) {
     for (const auto t : topology.tets_of(found_[i])) {
-      if (tets_seen_[t.value] == current_) continue;
-      tets_seen_[t.value] = current_;
+      if (!tets_seen_.insert(t.value)) continue;
       for (const auto node : topology.tet(t)) visit(node);
     }
     for (const auto node : topology.links_of(found_[i])) visit(node);
   }
   if (is_held)
-    for (const auto node : found_) held_[node.value] = current_;
+    for (const auto node : found_) held_.insert(node.value);
   return is_held;
 }
 
 void PieceList::find(const topology::Topology& topology, const world::World& world) {
   pieces_.clear();
   piece_of_.assign(topology.node_count(), kBody);
-  for (auto* stamps : {&seen_, &held_}) stamps->assign(topology.node_count(), 0);
-  tets_seen_.assign(topology.tet_count(), 0);
-  current_ = 1;
+  begin_search(topology);
   for (std::uint32_t n = 0; n < topology.node_count(); ++n) {
-    if (!topology.has_node(NodeIndex(n)) || seen_[n] == current_) continue;
+    if (!topology.has_node(NodeIndex(n)) || seen_.has(n)) continue;
     if (reaches_body(topology, world, NodeIndex(n))) continue;
     std::ranges::sort(found_);
     pieces_.push_back({found_});
@@ -53,13 +55,7 @@ void PieceList::update(const topology::Edit& edit, const world::World& world) {
   const auto& topology = edit.topology;
   const auto before = piece_of_.size();
   piece_of_.resize(topology.node_count(), kBody);
-  seen_.resize(topology.node_count());
-  held_.resize(topology.node_count());
-  tets_seen_.resize(topology.tet_count());
-  if (++current_ == 0) {
-    for (auto* stamps : {&seen_, &held_, &tets_seen_}) std::ranges::fill(*stamps, 0u);
-    current_ = 1;
-  }
+  begin_search(topology);
   bool has_changed = piece_of_.size() != before;
   for (const auto node : topology.changed()) {
     const auto old = piece_of_[node.value];
@@ -70,7 +66,7 @@ void PieceList::update(const topology::Edit& edit, const world::World& world) {
     }
   }
   for (const auto node : topology.changed()) {
-    if (!topology.has_node(node) || seen_[node.value] == current_) continue;
+    if (!topology.has_node(node) || seen_.has(node.value)) continue;
     if (reaches_body(topology, world, node)) continue;
     std::ranges::sort(found_);
     pieces_.push_back({found_});

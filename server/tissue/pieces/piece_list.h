@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/stamps.h"
 #include "server/tissue/topology/edit.h"
 #include "server/tissue/world/world.h"
 
@@ -38,6 +39,7 @@ class PieceList {
   std::span<const NodeIndex> body() const { return body_; }
 
  private:
+  void begin_search(const topology::Topology& topology);
   bool reaches_body(const topology::Topology& topology, const world::World& world, NodeIndex from);
   void number(const topology::Topology& topology, const world::World& world);
 
@@ -45,8 +47,7 @@ class PieceList {
   std::vector<std::uint32_t> piece_of_;
   std::vector<NodeIndex> body_;
   // Scratch: whom a search has seen, and which of them belong to the body.
-  std::vector<std::uint32_t> seen_, held_, tets_seen_;
-  std::uint32_t current_ = 0;
+  Stamps seen_, held_, tets_seen_;
   std::vector<NodeIndex> found_;
 };
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "server/tissue/contact/contact_law.h"
-#include "server/tissue/contact/self_contact.h"
 
 namespace trocar::pieces {
 namespace {

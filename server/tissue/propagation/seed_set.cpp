@@ -8,7 +8,7 @@ namespace trocar::propagation {
 
 void SeedSet::resize(std::size_t node_count) {
   contacts_.resize(node_count, kNoContact);
-  stamps_.resize(node_count);
+  is_named_.resize(node_count);
 }
 
 bool SeedSet::equals(Seeds seeds) const {
@@ -25,18 +25,14 @@ bool SeedSet::equals(Seeds seeds) const {
 
 void SeedSet::replace(Seeds seeds) {
   TROCAR_ASSERT(seeds.size() < kNoContact);
-  if (++current_ == 0) {
-    std::fill(stamps_.begin(), stamps_.end(), 0u);
-    current_ = 1;
-  }
+  is_named_.begin();
   std::swap(nodes_, previous_nodes_);
   nodes_.clear();
   ends_.clear();
   changes_.clear();
   for (std::size_t c = 0; c < seeds.size(); ++c) {
     for (const auto node : seeds[c]) {
-      if (stamps_[node.value] == current_) continue;
-      stamps_[node.value] = current_;
+      if (!is_named_.insert(node.value)) continue;
       auto& contact = contacts_[node.value];
       const auto now = static_cast<std::uint16_t>(c);
       if (contact != now) changes_.push_back({node, contact, now});
@@ -47,7 +43,7 @@ void SeedSet::replace(Seeds seeds) {
   }
   for (const auto node : previous_nodes_) {
     auto& contact = contacts_[node.value];
-    if (stamps_[node.value] == current_ || contact == kNoContact) continue;
+    if (is_named_.has(node.value) || contact == kNoContact) continue;
     changes_.push_back({node, contact, kNoContact});
     contact = kNoContact;
   }

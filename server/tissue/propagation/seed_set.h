@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/index.h"
+#include "common/base/stamps.h"
 
 namespace trocar::propagation {
 
@@ -38,8 +39,7 @@ class SeedSet {
   std::vector<NodeIndex> nodes_, previous_nodes_;
   std::vector<std::uint32_t> ends_;      // per contact, into nodes_
   std::vector<std::uint16_t> contacts_;  // per node
-  std::vector<std::uint32_t> stamps_;    // per node: the last replace() that named it
-  std::uint32_t current_ = 0;
+  Stamps is_named_;                      // per node: by the last replace()
   std::vector<Change> changes_;
 };
 
