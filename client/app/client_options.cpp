@@ -336,7 +336,7 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
       ->check(CLI::Range(1, kToolsPerHand))
       ->capture_default_str();
   app.add_option("--port", more.ports,
-                 "place that a device's shaft passes, mm, as a trocar holds a laparoscopic "
+                 "point that a device's shaft passes, mm, as a trocar holds a laparoscopic "
                  "instrument; twice: one for each [free]")
       ->type_name("X,Y,Z")
       ->expected(1)

@@ -3,13 +3,12 @@
 // A server that this client has started, for practice or for a lesson that it hosts. It ends with
 // the client, however that ends.
 
-#include <sys/types.h>
-
 #include <filesystem>
 #include <memory>
 #include <string>
 
 #include "common/base/result.h"
+#include "common/process/process.h"
 
 namespace trocar::app {
 
@@ -34,14 +33,14 @@ class OwnServer {
 
   const Settings& settings() const { return settings_; }
   // False: it has ended, and last_words() says why.
-  bool is_running();
+  bool is_running() { return !child_.poll(); }
   std::string last_words() const;
 
  private:
-  OwnServer(pid_t pid, Settings settings, std::filesystem::path log)
-      : pid_(pid), settings_(std::move(settings)), log_(std::move(log)) {}
+  OwnServer(process::Child child, Settings settings, std::filesystem::path log)
+      : child_(std::move(child)), settings_(std::move(settings)), log_(std::move(log)) {}
 
-  pid_t pid_;  // -1: it has ended
+  process::Child child_;
   Settings settings_;
   std::filesystem::path log_;
 };

@@ -167,13 +167,13 @@ void Picture::add_measure(ui::HudModel& model) const {
   const auto& measured = pane_.measured();
   const auto ruler = pane_.ruler();
   if (beside_)
-    model.measure_text = "Measure: click two places on an organ. D or Esc ends that.";
+    model.measure_text = "Measure: click two points on an organ. D or Esc ends that.";
   else if (measured.count() == 0)
-    model.measure_text = "Measure: click a place on the organ. D or Esc ends that.";
+    model.measure_text = "Measure: click a point on the organ. D or Esc ends that.";
   else if (measured.count() == 1)
-    model.measure_text = "Click the other place.";
+    model.measure_text = "Click the other point.";
   else if (!measured.distance_m())
-    model.measure_text = "A measured place has no tissue at this time.";
+    model.measure_text = "A measured point has no tissue at this time.";
   else
     model.measure_text = ruler.text + " in a straight line. A click begins anew, D ends that.";
   if (!beside_) model.rulers.push_back(ruler);

@@ -98,13 +98,13 @@ class Judgement {
     add("round trip", is_slow ? Grade::Limited : Grade::Good,
         fmt::format("{:.0f} ms, 95 % within {:.0f} ms.", visit.round_trip_ms,
                     visit.round_trip_95_ms),
-        "Use a cable instead of a radio link, and end downloads on this network.");
+        "Use a cable instead of a radio network, and end downloads on this network.");
     if (!visit.has_datagrams)
       return add("loss", Grade::Limited, "No datagram arrives, so all goes over the stream.",
                  "Open the server's port for UDP: then a lost packet holds nothing up.");
     add("loss", visit.lost_share > kGoodLostShare ? Grade::Limited : Grade::Good,
         fmt::format("{:.1f} % of datagrams.", visit.lost_share * 1e2),
-        "Use a cable, or move nearer to the radio station; others may fill the link.");
+        "Use a cable, or move nearer to the radio station; others may fill the network.");
   }
 
   void add_frames() {
@@ -116,7 +116,7 @@ class Judgement {
                     "{:.1f} s when joining.",
                     visit.frames_per_second, visit.frame_bytes, kbit, visit.join_bytes * 1e-3,
                     visit.join_seconds),
-        fmt::format("Only {:.0f} % of the frames arrive: the link is too slow or too full.",
+        fmt::format("Only {:.0f} % of the frames arrive: the network is too slow or too full.",
                     visit.frames_share * 1e2));
     if (visit.session_speed < kGoodSessionSpeed)
       add("session", Grade::Limited,

@@ -119,7 +119,7 @@ class HandReader {
                         path_ + ": the sample at tick " + std::to_string(tick) +
                             (samples.size() == kMostSamples
                                  ? " is one too many, 4000000 are the most"
-                                 : " is no place of a tool; was it written by another program?")};
+                                 : " is no pose of a tool; was it written by another program?")};
               return false;
             }
             const RecordedHand::Sample sample{

@@ -9,7 +9,7 @@ std::string describe_absence(double away_seconds, double left_seconds) {
   const bool is_fresh = away_seconds < 0.5;
   return (is_fresh ? "The connection broke just now."
                    : "The connection broke " + whole(away_seconds) + " ago.") +
-         " Trying again; your place is kept for " + whole(left_seconds) + ".";
+         " Trying again; your seat is kept for " + whole(left_seconds) + ".";
 }
 
 }  // namespace trocar::ui

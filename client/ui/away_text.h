@@ -6,7 +6,7 @@
 
 namespace trocar::ui {
 
-// "The connection broke 4 s ago. Trying again; your place is kept for 26 s."
+// "The connection broke 4 s ago. Trying again; your seat is kept for 26 s."
 std::string describe_absence(double away_seconds, double left_seconds);
 
 }  // namespace trocar::ui

@@ -219,7 +219,7 @@ Box draw_help(const HudModel& model, const Box& timeline, const Sides& sides, co
       if (model.pair->has_stages.value_or(false))
         help_row("B", model.pair->is_by_stage ? "both from their start" : "stage by stage");
     }
-    help_row("D", "measure: click two places; D or Esc ends that");
+    help_row("D", "measure: click two points; D or Esc ends that");
     help_row("right drag", "turn the view");
     help_row("middle drag", "move the view");
     help_row("Ctrl+wheel, + -", "zoom");

@@ -98,6 +98,24 @@ void UnfinishedFile::forget() {
   slot_ = kMostFiles;
 }
 
+Status write_whole_file(const std::string& path, std::string_view content, unsigned mode) {
+  UnfinishedFile part(UnfinishedFile::name_for(path));
+  ::unlink(part.path().c_str());  // left by a program that was killed
+  const int file = ::open(part.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+  int failed = file < 0 ? errno : 0;
+  while (failed == 0 && !content.empty()) {
+    const auto written = ::write(file, content.data(), content.size());
+    if (written > 0)
+      content.remove_prefix(static_cast<std::size_t>(written));
+    else if (errno != EINTR)
+      failed = errno;
+  }
+  if (file >= 0 && ::close(file) != 0 && failed == 0) failed = errno;
+  if (failed == 0) return part.rename_to(path);
+  return Error{ErrorCode::ResourceMissing, path + ": cannot be written (" + std::strerror(failed) +
+                                               "): check that its folder is there and has room"};
+}
+
 void remove_unfinished_files_on_signals() {
   for (const int number : {SIGTERM, SIGINT, SIGHUP})
     if (std::signal(number, remove_and_end) == SIG_IGN) std::signal(number, SIG_IGN);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 #include "common/base/result.h"
 
@@ -34,6 +35,10 @@ class UnfinishedFile {
   std::string path_;  // empty: it has its name
   std::size_t slot_;  // among those that a signal removes
 };
+
+// Writes a file of that name beside and renames it: whoever waits for it never sees half of it. It
+// takes the place of a file, or of a link, of that name. `mode`: as open(2) has it.
+Status write_whole_file(const std::string& path, std::string_view content, unsigned mode = 0666);
 
 // From then on SIGTERM, SIGINT and SIGHUP remove what is unfinished, and end the program as they do
 // anyway. Those that are ignored stay so. Call once, before there are threads.

@@ -108,7 +108,7 @@ void read_line(TableReader& reader, Stage& stage, Document& document) {
   }
   const auto* list = node->as_array();
   const auto wrong = [&] {
-    reader.fail("line_mm", "is not a list of places, write [[x, y, z], ...]");
+    reader.fail("line_mm", "is not a list of points, write [[x, y, z], ...]");
   };
   if (list == nullptr || list->size() < 2 || list->size() > kMostLinePoints) return wrong();
   for (const auto& item : *list) {

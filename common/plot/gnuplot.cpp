@@ -1,54 +1,14 @@
 #include "common/plot/gnuplot.h"
 
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
+#include <algorithm>
 
-#include <array>
-#include <cerrno>
-#include <cstring>
-
-extern char** environ;
+#include "common/process/memory_file.h"
+#include "common/process/process.h"
 
 namespace trocar::plot {
 namespace {
 
-class MemoryFile {
- public:
-  MemoryFile() : descriptor_(memfd_create("gnuplot", MFD_CLOEXEC)) {}
-  ~MemoryFile() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-
-  int descriptor() const { return descriptor_; }
-  bool fill(const std::string& text) {
-    for (std::size_t done = 0; done < text.size();) {
-      const auto written = write(descriptor_, text.data() + done, text.size() - done);
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) return false;
-      done += static_cast<std::size_t>(written);
-    }
-    return lseek(descriptor_, 0, SEEK_SET) == 0;
-  }
-  std::string content() const {
-    std::string text;
-    std::array<char, 65536> part;
-    for (;;) {
-      const auto got =
-          pread(descriptor_, part.data(), part.size(), static_cast<off_t>(text.size()));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) return text;
-      text.append(part.data(), static_cast<std::size_t>(got));
-    }
-  }
-
- private:
-  int descriptor_;
-};
+constexpr std::size_t kMostPicture = std::size_t{256} << 20, kMostComplaint = 64 * 1024;
 
 // gnuplot shows the line of its script, marks the place, then says what is wrong: the last line.
 std::string last_line(const std::string& text) {
@@ -62,32 +22,18 @@ std::string last_line(const std::string& text) {
 }  // namespace
 
 Result<std::string> run_gnuplot(const std::string& program, const std::string& script) {
-  MemoryFile in, out, complaints;
-  if (in.descriptor() < 0 || out.descriptor() < 0 || complaints.descriptor() < 0 ||
-      !in.fill(script))
-    return Error{ErrorCode::ResourceMissing,
-                 "plot: no memory for the data of " + program + " (" + std::strerror(errno) + ")"};
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, in.descriptor(), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, out.descriptor(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, complaints.descriptor(), STDERR_FILENO);
-  std::string name = program, no_start_file = "-d";
-  std::array<char*, 3> argv{name.data(), no_start_file.data(), nullptr};
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0)
-    return Error{ErrorCode::ResourceMissing, "plot: " + program + " cannot be started (" +
-                                                 std::strerror(failed) +
-                                                 "), install gnuplot-nox (deploy/setup does)"};
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    return Error{ErrorCode::ResourceMissing,
-                 "plot: " + program + " failed: " + last_line(complaints.content())};
-  return out.content();
+  const process::MemoryFile in(script), out, complaints;
+  const std::string without_start_file = "-d";
+  auto child = process::Child::start({.words = {program, without_start_file},
+                                      .in = in.descriptor(),
+                                      .out = out.descriptor(),
+                                      .errors = complaints.descriptor()});
+  if (!child)
+    return Error{child.error().code,
+                 "plot: " + child.error().message + ", install gnuplot-nox (deploy/setup does)"};
+  if (child->wait().exit_code == 0) return out.text(kMostPicture);
+  return Error{ErrorCode::ResourceMissing,
+               "plot: " + program + " failed: " + last_line(complaints.text(kMostComplaint))};
 }
 
 }  // namespace trocar::plot

@@ -12,6 +12,7 @@
 #include <iterator>
 #include <vector>
 
+#include "common/base/unfinished_file.h"
 #include "common/base/writable.h"
 
 namespace trocar::secure {
@@ -80,21 +81,7 @@ Status check_private_folder(const fs::path& folder) {
 }
 
 Status write_private_file(const fs::path& path, std::string_view text) {
-  const std::string part = path.string() + ".part" + std::to_string(::getpid());
-  ::unlink(part.c_str());
-  const int file = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  bool is_good = file >= 0;
-  while (is_good && !text.empty()) {
-    const auto written = ::write(file, text.data(), text.size());
-    is_good = written > 0;
-    if (is_good) text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  if (file >= 0) is_good = ::close(file) == 0 && is_good;
-  is_good = is_good && ::rename(part.c_str(), path.c_str()) == 0;
-  if (is_good) return {};
-  const auto error = missing(path, "cannot be written", "check that the folder has room");
-  ::unlink(part.c_str());
-  return error;
+  return write_whole_file(path.string(), text, 0600);
 }
 
 Result<std::string> read_small_file(const fs::path& path) {

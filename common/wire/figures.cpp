@@ -34,6 +34,8 @@ const char* name_of(Stage stage) {
       return "hash";
     case Stage::Publish:
       return "publish";
+    case Stage::Bleed:
+      return "bleed";
   }
   return "?";
 }

@@ -11,8 +11,8 @@
 namespace trocar::wire {
 
 // A tick has these stages, each with its times.
-enum class Stage { Admit, Contacts, Queue, Solve, Cut, Claims, Hash, Publish };
-inline constexpr std::size_t kStageCount = 8;
+enum class Stage { Admit, Contacts, Queue, Solve, Cut, Claims, Hash, Publish, Bleed };
+inline constexpr std::size_t kStageCount = 9;
 const char* name_of(Stage stage);
 
 // These layers have sweeps of their own: touched nodes, layer 1, layer 2, all active ones beyond.

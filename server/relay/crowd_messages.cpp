@@ -163,7 +163,7 @@ std::optional<Crowd::Ending> Crowd::admit(Watcher& watcher, const proto::Hello& 
     return Ending{EndReason::NameInvalid, participants::kNameRule};
   if (watchers_here_ >= options_.most_watchers)
     return Ending{EndReason::Full, "full: all " + std::to_string(options_.most_watchers) +
-                                       " places of this relay are taken"};
+                                       " seats of this relay are taken"};
   if (request->acks_every_frame) watcher.feed.pace();
   proto::Envelope welcome;
   *welcome.mutable_welcome() = *welcome_;

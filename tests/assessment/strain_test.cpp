@@ -29,9 +29,10 @@ class StrainMapTest : public ::testing::Test {
   // Displaces every node.
   template <typename Field>
   void deform(Field field) {
-    auto& world = simulation_.editable_state().world;
-    for (std::size_t i = 0; i < world.node_count(); ++i)
-      world.displacements[i] = field(world.rest_positions[i]);
+    std::vector<Vec3f> displacements;
+    for (const auto& place : simulation_.state().world.rest_positions)
+      displacements.push_back(field(place));
+    simulation_.start_relaxed(displacements);
   }
   step::Simulation simulation_;
 };

@@ -1,7 +1,6 @@
 // Measures what bleeding takes: a blade goes through the built-in liver to and fro for some
 // seconds, and the wound then bleeds on. CPU time of a frame's blood beside that of its ticks,
-// bytes of it in a frame for a client that keeps up, and the hash of the state, which bleeding may
-// not change.
+// bytes of it in a frame for a client that keeps up, and the hash of the state.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -11,7 +10,6 @@
 #include "common/base/program.h"
 #include "common/base/timing.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar {
@@ -41,8 +39,9 @@ tool::ToolSample sample_at(double seconds, double cutting_s) {
 }
 
 void run(organ::Organ organ, const Options& options) {
-  step::Simulation simulation(std::move(organ));
-  bleeding::Bleeding bleeding(bleeding::Rules{});
+  step::SceneRules rules;
+  if (!options.is_off) rules.bleeding.emplace();
+  step::Simulation simulation(std::move(organ), 1, rules);
   hands::TickInputs inputs;
   inputs.joins.push_back({.slot = {0},
                           .tool_count = 1,
@@ -65,9 +64,8 @@ void run(organ::Organ organ, const Options& options) {
     tick_us.push_back(all);
     const auto frame = simulation.pop_frame();
     if (!frame || options.is_off) continue;
-    const auto begin = thread_cpu_ns();
-    bleeding.observe(*frame, simulation.layout(), simulation.state().tools);
-    blood_us.push_back(1e-3 * static_cast<double>(thread_cpu_ns() - begin));
+    constexpr auto kBleed = static_cast<std::size_t>(step::Stage::Bleed);
+    blood_us.push_back(1e-3 * static_cast<double>(report.stage_cpu_ns[kBleed]));
     Bytes delta;
     wire::encode_blood(before, frame->blood, delta);
     before = frame->blood;
@@ -104,7 +102,7 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", options.seconds, "simulated")->capture_default_str();
   app.add_option("--cutting", options.cutting_s, "seconds of it with a blade")
       ->capture_default_str();
-  app.add_flag("--off", options.is_off, "nothing bleeds, for the state hash");
+  app.add_flag("--off", options.is_off, "nothing bleeds, for comparison");
   CLI11_PARSE(app, argc, argv);
   auto organ = catalogue::load_organ(options.organ);
   if (!organ) return report(kProgram, organ.error());

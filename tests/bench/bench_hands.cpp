@@ -126,8 +126,8 @@ class Session {
       pilot_ = calibration::PressBench(organ, options.workers)
                    .pilot(places.front(), {.radius_m = kToolRadius_m, .depth_m = kPilotDepth_m});
       for (auto* solved : {&reference_, &checker_})
-        solved->emplace(organ, options.workers, cutting::Settings{}, step::LoadRules{},
-                        dynamics::StrainScheme::Implicit);
+        solved->emplace(organ, options.workers,
+                        step::SceneRules{.strain_scheme = dynamics::StrainScheme::Implicit});
     }
     for (const auto& place : places) {
       const auto number = static_cast<std::uint8_t>(hands_.size());

@@ -1,12 +1,13 @@
-// Laws of a session's blood on an organ that is being cut: nothing is lost, and equal frames give
+// Laws of a session's blood on an organ that is being cut: nothing is lost, and equal ticks give
 // equal blood, however they are reached.
 
-#include "server/session/bleeding/bleeding.h"
+#include "server/tissue/bleeding/bleeding.h"
 
 #include <gtest/gtest.h>
 
 #include <optional>
 
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/bleeding/cut_liver.h"
 
 namespace trocar::bleeding {
@@ -14,109 +15,117 @@ namespace {
 
 using testing::cut_liver;
 
-Bytes state_of(Bleeding& bleeding) {
-  Bytes bytes;
-  bleeding.write_state(bytes);
-  return bytes;
-}
-
 TEST(Bleeding, NothingIsLostWhateverIsCut) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    Bleeding bleeding(Rules{});
-    std::int64_t most = 0;
+    Blood blood;
     cut_liver(seed, 3000, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
-      bleeding.observe(frame, simulation.layout(), simulation.state().tools);
-      const auto& blood = bleeding.blood();
+      const auto before_pl = blood.shed_pl;
+      blood = *simulation.state().blood;
       ASSERT_EQ(blood.volume_pl.size(), simulation.layout().vertex_count());
       ASSERT_EQ(blood.shed_pl, blood.on_surface_pl() + blood.dripped_pl + blood.sucked_pl)
           << "seed " << seed << ", frame " << frame.frame;
       for (const auto pl : blood.volume_pl) ASSERT_GE(pl, 0);
-      ASSERT_GE(blood.shed_pl, most) << "blood does not run back";
-      most = blood.shed_pl;
+      ASSERT_GE(blood.shed_pl, before_pl) << "blood does not run back";
+      ASSERT_EQ(frame.blood, blood.levels);
+      ASSERT_EQ(frame.blood_crc, wire::blood_crc(blood.levels));
     });
-    EXPECT_GT(most, 1'000'000'000) << "over a millilitre, or this has shown nothing";
-    EXPECT_GT(bleeding.blood().sucked_pl, 0);
+    EXPECT_GT(blood.shed_pl, 1'000'000'000) << "over a millilitre, or this has shown nothing";
+    EXPECT_GT(blood.sucked_pl, 0);
   }
 }
 
-TEST(Bleeding, EqualFramesGiveEqualBlood) {
-  std::vector<std::uint32_t> crcs;
-  for (int run = 0; run < 2; ++run) {
-    Bleeding bleeding(Rules{});
-    std::size_t next = 0;
-    cut_liver(7, 1600, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
-      bleeding.observe(frame, simulation.layout(), simulation.state().tools);
-      if (run == 0)
-        crcs.push_back(frame.blood_crc);
-      else
-        ASSERT_EQ(frame.blood_crc, crcs.at(next++));
-    });
-  }
+TEST(Bleeding, IsInTheHashOfTheNextTick) {
+  std::optional<step::Simulation> dry;
+  std::uint64_t ticks_apart = 0;
+  cut_liver(
+      7, 600,
+      [&](step::PublishedFrame&, step::Simulation& simulation) {
+        ticks_apart += dry->state_hash() != simulation.state_hash();
+      },
+      [&](Tick tick, const hands::TickInputs& inputs) {
+        if (tick == 1) dry.emplace(*catalogue::make_liver(800));
+        dry->tick(inputs, {});
+      });
+  EXPECT_EQ(ticks_apart, 600u / kTicksPerFrame) << "also before the first cut: its arrays stand";
 }
 
-// A restore builds anew what follows from the layout, and it must come out to the bit.
+// A restored state builds anew what follows from the layout, and it must come out to the bit.
 TEST(Bleeding, ARestoredStateGoesOnAsIfNothingHadBeen) {
-  Bleeding bleeding(Rules{});
-  std::optional<Bleeding> restored;
-  cut_liver(5, 2400, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
-    if (frame.frame % 25 == 0) {
-      restored.emplace(Rules{});
-      ASSERT_TRUE(restored->restore_state(state_of(bleeding)).ok());
+  std::optional<step::Simulation> restored;
+  std::shared_ptr<step::PublishedFrame> again;
+  std::uint64_t frames = 0;
+  const auto observe = [&](step::PublishedFrame& frame, step::Simulation& simulation) {
+    if (restored) {
+      ASSERT_TRUE(again);
+      ASSERT_EQ(again->blood, frame.blood) << "frame " << frame.frame;
+      ASSERT_EQ(again->figures.blood, frame.figures.blood);
+      ASSERT_EQ(restored->state_hash(), simulation.state_hash()) << "frame " << frame.frame;
+      ++frames;
     }
-    step::PublishedFrame again = frame;
-    bleeding.observe(frame, simulation.layout(), simulation.state().tools);
+    if (frame.frame % 25 != 0) return;
+    Bytes state;
+    simulation.write_snapshot(state);
+    if (!restored) restored.emplace(simulation.beside());
+    ASSERT_TRUE(restored->restore_snapshot(state).ok());
+  };
+  cut_liver(5, 2400, observe, [&](Tick, const hands::TickInputs& inputs) {
     if (!restored) return;
-    again.change = nullptr;  // as after a start from a snapshot
-    restored->observe(again, simulation.layout(), simulation.state().tools);
-    ASSERT_EQ(again.blood, frame.blood) << "frame " << frame.frame;
-    ASSERT_EQ(again.figures.blood, frame.figures.blood);
-    ASSERT_EQ(state_of(*restored), state_of(bleeding)) << "frame " << frame.frame;
+    restored->tick(inputs, {});
+    if (auto frame = restored->pop_frame()) again = frame;
   });
+  EXPECT_GT(frames, 100u);
 }
 
 TEST(Bleeding, BytesThatAreNoStateAreRefused) {
-  Bleeding bleeding(Rules{});
-  cut_liver(3, 800, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
-    bleeding.observe(frame, simulation.layout(), simulation.state().tools);
+  Blood blood;
+  cut_liver(3, 800, [&](step::PublishedFrame&, step::Simulation& simulation) {
+    blood = *simulation.state().blood;
   });
-  const Bytes whole = state_of(bleeding);
-  for (std::size_t size = 0; size < whole.size(); size += 97) {
-    Bleeding other(Rules{});
-    EXPECT_FALSE(other.restore_state(BytesView(whole).first(size)).ok()) << size;
+  Bytes whole;
+  auto writing = world::StateArchive::writing(whole);
+  blood.visit_state(writing);
+  const auto is_read = [](BytesView bytes) {
+    Blood other;
+    auto reading = world::StateArchive::reading(bytes);
+    other.visit_state(reading);
+    return reading.ok() && reading.at_end();
+  };
+  for (std::size_t size = 0; size < whole.size(); size += 97)
+    EXPECT_FALSE(is_read(BytesView(whole).first(size))) << size;
+  for (std::size_t at = 0; at < whole.size(); at += whole.size() / 50) {
+    Bytes wrong = whole;
+    wrong[at] ^= 0x40;
+    EXPECT_FALSE(is_read(wrong)) << at;
   }
-  // A volume that is not in the sums.
-  Bytes wrong = whole;
-  wrong[4 + 3] ^= 0x40;
-  Bleeding other(Rules{});
-  EXPECT_FALSE(other.restore_state(wrong).ok());
-  EXPECT_TRUE(other.restore_state(whole).ok());
+  EXPECT_TRUE(is_read(whole));
 }
 
 // Two marks stand side by side; a return to the first is not one to the second.
 TEST(Bleeding, AReturnToAMarkBringsItsBloodBack) {
-  Bleeding bleeding(Rules{});
-  std::optional<std::int64_t> first_pl, second_pl;
-  cut_liver(2, 2400, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
-    const auto before = bleeding.blood().shed_pl;
-    const auto add = [&](hands::MarkAction action, std::uint8_t number) {
-      frame.mark_events.push_back({frame.tick, action, true, number});
+  constexpr Tick kFirst = 961, kSecond = 1441, kToFirst = 1761, kToSecond = 2081;
+  std::int64_t shed_pl = 0, first_pl = 0, second_pl = 0;
+  const auto observe = [&](step::PublishedFrame& frame, step::Simulation& simulation) {
+    shed_pl = simulation.state().blood->shed_pl;
+    if (frame.tick == kToFirst - 1 + kTicksPerFrame) {
+      EXPECT_GE(shed_pl, first_pl);
+      EXPECT_LT(shed_pl, second_pl);
+    }
+    if (frame.tick == kToSecond - 1 + kTicksPerFrame) {
+      EXPECT_GE(shed_pl, second_pl);
+    }
+  };
+  cut_liver(2, 2400, observe, [&](Tick tick, hands::TickInputs& inputs) {
+    const auto use = [&](hands::MarkAction action, std::uint8_t number) {
+      inputs.mark = action;
+      inputs.mark_number = number;
     };
-    if (frame.frame == 60) add(hands::MarkAction::Set, 0), first_pl = before;
-    if (frame.frame == 90) add(hands::MarkAction::Set, 3), second_pl = before;
-    if (frame.frame == 110) add(hands::MarkAction::Return, 0);
-    if (frame.frame == 130) add(hands::MarkAction::Return, 3);
-    bleeding.observe(frame, simulation.layout(), simulation.state().tools);
-    const auto after = bleeding.blood().shed_pl;
-    if (frame.frame == 110) {
-      EXPECT_GE(after, *first_pl);
-      EXPECT_LT(after, *second_pl);
-    }
-    if (frame.frame == 130) {
-      EXPECT_GE(after, *second_pl);
-    }
+    if (tick == kFirst) use(hands::MarkAction::Set, 0), first_pl = shed_pl;
+    if (tick == kSecond) use(hands::MarkAction::Set, 3), second_pl = shed_pl;
+    if (tick == kToFirst) use(hands::MarkAction::Return, 0);
+    if (tick == kToSecond) use(hands::MarkAction::Return, 3);
   });
-  ASSERT_TRUE(first_pl && second_pl);
-  EXPECT_GT(*second_pl, *first_pl);
+  EXPECT_GT(first_pl, 0);
+  EXPECT_GT(second_pl, first_pl);
 }
 
 }  // namespace

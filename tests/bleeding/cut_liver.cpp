@@ -9,8 +9,8 @@
 
 namespace trocar::bleeding::testing {
 
-void cut_liver(std::uint64_t seed, Tick ticks, const Observe& observe) {
-  step::Simulation simulation(*catalogue::make_liver(800));
+void cut_liver(std::uint64_t seed, Tick ticks, const Observe& observe, const Prepare& prepare) {
+  step::Simulation simulation(*catalogue::make_liver(800), 1, {.bleeding = Rules{}});
   trocar::testing::Random random(seed);
   Vec3f top{0, -1, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions)
@@ -41,6 +41,7 @@ void cut_liver(std::uint64_t seed, Tick ticks, const Observe& observe) {
       const Pose beside{pose.position + Vec3f{0, 0.03f, 0}, pose.orientation};
       inputs.samples.push_back({tool_slot({0}, 1), {beside, tool::Verb::Push}, 0});
     }
+    if (prepare) prepare(tick, inputs);
     simulation.tick(inputs, {});
     inputs.clear();
     if (auto frame = simulation.pop_frame()) observe(*frame, simulation);

@@ -1,13 +1,13 @@
 // A film on surfaces of which it is known where blood has to go.
 
-#include "server/session/bleeding/film.h"
+#include "server/tissue/bleeding/film.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "server/session/bleeding/rules.h"
+#include "server/tissue/bleeding/rules.h"
 #include "tests/bleeding/height_field.h"
 
 namespace trocar::bleeding {

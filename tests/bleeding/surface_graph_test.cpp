@@ -1,6 +1,6 @@
 // A graph that has followed every change is the one that is built from the surface at the end.
 
-#include "server/session/bleeding/surface_graph.h"
+#include "server/tissue/bleeding/surface_graph.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Compares what runs out of an opened vessel with the laws of its supply and of an orifice.
 
-#include "server/session/bleeding/vessels.h"
+#include "server/tissue/bleeding/vessels.h"
 
 #include <gtest/gtest.h>
 

@@ -17,19 +17,11 @@ command -v node >/dev/null || skip "node is not installed"
 command -v npm >/dev/null || skip "npm is not installed"
 node -e 'process.exit(process.versions.node.split(".")[0] >= 18 ? 0 : 1)' || skip "node is older than 18"
 
-mkdir -p "$work_folder"
+code=0
+"$source_folder/../../deploy/lib/modules" "$source_folder" "$work_folder" || code=$?
+[ "$code" -ne 77 ] || skip "npm cannot reach its registry"
+[ "$code" -eq 0 ] || exit "$code"
 cd "$work_folder"
-if ! cmp -s "$source_folder/package-lock.json" installed-lock.json; then
-  cp "$source_folder/package.json" "$source_folder/package-lock.json" "$source_folder/.npmrc" .
-  if ! npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1; then
-    cat npm.log
-    if grep -qE 'ENOTFOUND|ECONN|ETIMEDOUT|EAI_AGAIN|ENETUNREACH|ENOTCACHED|network' npm.log; then
-      skip "npm cannot reach its registry"
-    fi
-    exit 1
-  fi
-  cp package-lock.json installed-lock.json
-fi
 
 rm -rf journals
 mkdir journals

@@ -261,7 +261,7 @@ TEST_F(DicomReader, SaysWhatIsWrongWithASeries) {
             "segment it first, in 3D Slicer for instance");
   empty();
   series(-1, [](DcmItem& data, int k) { put(data, DCM_ImagePositionPatient, place(k / 2)); });
-  EXPECT_EQ(error_of(folder_), "5 slices stand at 3 places: it is more than one series");
+  EXPECT_EQ(error_of(folder_), "5 slices stand at 3 positions: it is more than one series");
   empty();
   write("one", [](DcmItem& data) { make_slice(data, 0); });
   EXPECT_EQ(error_of(folder_ / "one"),

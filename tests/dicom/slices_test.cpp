@@ -57,7 +57,7 @@ TEST(Slices, WhatFormsNoGridIsRefused) {
   ASSERT_FALSE(flat.ok());
   // Memory follows the slices that are there.
   EXPECT_EQ(error_of({{0, 0, 0}, {0, 0, 0.01}, {0, 0, 100}}, {}, true),
-            "its 3 slices are spread over 10001 places: most of them are missing");
+            "its 3 slices are spread over 10001 positions: most of them are missing");
 }
 
 }  // namespace

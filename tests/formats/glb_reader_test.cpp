@@ -193,7 +193,7 @@ TEST(GlbReader, APictureThatIsNoneForAllIsNamed) {
   EXPECT_EQ(fault_after([](Glb& g) {
               g.json["meshes"][0]["primitives"][1]["attributes"].erase("TEXCOORD_0");
             }),
-            "a.glb: some of its meshes have no place in the picture");
+            "a.glb: some of its meshes have no texture coordinates");
   EXPECT_EQ(fault_after([](Glb& g) {
               g.json["images"][0] = {{"uri", "liver.png"}};
             }),

@@ -86,7 +86,7 @@ TEST(LeftOut, WhatADeckMakesOrMovesIsRefusedOrSaid) {
                                  "*END PART\n*INSTANCE, NAME=I, PART=P\n100.,0.,0.\n"
                                  "*END INSTANCE\n*MATERIAL, NAME=M\n*ELASTIC\n1.,0.\n*ELASTIC\n",
                              "a.inp");
-  EXPECT_EQ(mesh.left_out, Lines{"left out: 'the place of *INSTANCE', '*MATERIAL', '*ELASTIC'"});
+  EXPECT_EQ(mesh.left_out, Lines{"left out: 'the position of *INSTANCE', '*MATERIAL', '*ELASTIC'"});
 }
 
 const std::string kGroups =

@@ -78,7 +78,7 @@ constexpr Expected kOutcomes[] = {
      "larger than 2 m: if the file is in millimetres, import it with "
      "trocar-organ import --unit mm",
      nullptr},
-    {"all_nodes_equal.msh", "all nodes are at the same place", nullptr},
+    {"all_nodes_equal.msh", "all nodes are at the same position", nullptr},
     {"far_from_origin.msh", nullptr, "far from the origin"},
     {"mesh_2d.msh", "no tetrahedra", nullptr},
     {"hexahedron.msh", "type 5 (hexahedron), which is not supported", nullptr},

@@ -42,9 +42,9 @@
 #include "server/organs/surface/closed_surface.h"
 #include "server/papers/reduction/reduction_file.h"
 #include "server/session/access/code_book.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/load_messages.h"
 #include "server/session/replication/validation.h"
+#include "server/tissue/bleeding/blood.h"
 #include "server/tissue/world/surface_layout.h"
 
 namespace trocar::fuzz {
@@ -142,10 +142,13 @@ bool decode_blood(BytesView bytes) {
 
 // The blood of a snapshot. A state that is accepted is written as it was read.
 bool decode_bleeding(BytesView bytes) {
-  bleeding::Bleeding bleeding(bleeding::Rules{});
-  if (!checked(bleeding.restore_state(bytes))) return false;
+  bleeding::Blood blood;
+  auto reading = world::StateArchive::reading(bytes);
+  blood.visit_state(reading);
+  if (!reading.ok() || !reading.at_end()) return false;
   Bytes again;
-  bleeding.write_state(again);
+  auto writing = world::StateArchive::writing(again);
+  blood.visit_state(writing);
   TROCAR_ASSERT(std::ranges::equal(again, bytes));
   return true;
 }

@@ -1,5 +1,6 @@
 // The program: its options, what it refuses, and that it ends as it should.
 
+#include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -82,7 +83,7 @@ TEST_F(ImpairProgram, ItEndsWithASummaryOnSigtermAndAfterItsSeconds) {
   start({"--listen", "127.0.0.1:0", "--ready-file", at("ready"), "--summary", at("summary.json"),
          "--seed", "9"});
   while (!std::filesystem::exists(folder_ / "ready")) std::this_thread::sleep_for(milliseconds(5));
-  kill(pid_, SIGTERM);
+  child_->signal(SIGTERM);
   EXPECT_EQ(wait(), 0) << log();
   const auto summary = nlohmann::json::parse(read(folder_ / "summary.json"));
   EXPECT_EQ(summary.at("seed"), 9);

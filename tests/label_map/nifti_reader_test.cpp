@@ -84,7 +84,8 @@ TEST(NiftiReader, SaysWhereSformAndQformDisagree) {
   EXPECT_EQ(warnings_of(file),
             "sform and qform disagree about the sides: sform says RAS, qform LPS; sform was taken");
   put(file, 264, 2.0f);
-  EXPECT_EQ(warnings_of(file), "sform and qform disagree: qform gives no place, sform was taken");
+  EXPECT_EQ(warnings_of(file),
+            "sform and qform disagree: qform gives no position, sform was taken");
 }
 
 TEST(NiftiReader, ASlopeOfZeroScalesNothing) {

@@ -131,7 +131,7 @@ TEST(LessonFile, SaysWhatIsWrongAndWhere) {
             std::string::npos);
   EXPECT_NE(
       error_of(whole + "[[stage]]\nname = \"L\"\ntext = \"t\"\ngoal = \"follow\"\nline_mm = 3\n")
-          .find("is not a list of places"),
+          .find("is not a list of points"),
       std::string::npos);
   EXPECT_NE(error_of(head + kBall + kBall + kFind).find("is that of another one above"),
             std::string::npos);

@@ -233,7 +233,7 @@ TEST(Handshake, the_host_may_want_fewer_hands_watchers_and_tools) {
   ASSERT_TRUE(watcher.join("watcher", proto::ROLE_OBSERVER));
   const auto no_hand = refusal_of(session, make_hello("second", proto::ROLE_ASSISTANT));
   EXPECT_EQ(no_hand.reason(), proto::GOODBYE_FULL);
-  EXPECT_NE(no_hand.text().find("all 1 places with tools"), std::string::npos) << no_hand.text();
+  EXPECT_NE(no_hand.text().find("all 1 seats with tools"), std::string::npos) << no_hand.text();
   const auto no_watcher = refusal_of(session, make_hello("third", proto::ROLE_INSTRUCTOR));
   EXPECT_EQ(no_watcher.reason(), proto::GOODBYE_FULL);
 }
@@ -249,7 +249,7 @@ TEST(Handshake, observers_leave_room_for_who_leads) {
   }
   const auto refused = refusal_of(session, make_hello("late", proto::ROLE_OBSERVER));
   EXPECT_EQ(refused.reason(), proto::GOODBYE_FULL);
-  EXPECT_NE(refused.text().find("all 9 places for watchers"), std::string::npos) << refused.text();
+  EXPECT_NE(refused.text().find("all 9 seats for watchers"), std::string::npos) << refused.text();
   RawClient instructor(session.port());
   EXPECT_TRUE(instructor.join("Ivy", proto::ROLE_INSTRUCTOR));
 }
@@ -266,7 +266,7 @@ TEST(Handshake, instructors_leave_half_of_the_places_to_who_looks_on) {
   }
   const auto refused = refusal_of(session, make_hello("late", proto::ROLE_INSTRUCTOR));
   EXPECT_EQ(refused.reason(), proto::GOODBYE_FULL);
-  EXPECT_NE(refused.text().find("all 5 places for instructors"), std::string::npos)
+  EXPECT_NE(refused.text().find("all 5 seats for instructors"), std::string::npos)
       << refused.text();
   RawClient observer(session.port()), surgeon(session.port());
   EXPECT_TRUE(observer.join("Otto", proto::ROLE_OBSERVER));

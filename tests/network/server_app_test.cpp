@@ -1,7 +1,6 @@
 // The server program's parts: pacing, the simulation loop's frames and records, the command line,
 // and one run of the whole program as a process.
 
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,9 +9,11 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <optional>
 #include <sstream>
 
 #include "common/journal/mcap_reader.h"
+#include "common/process/process.h"
 #include "server/app/server/frame_handover.h"
 #include "server/app/server/options.h"
 #include "server/app/server/pacer.h"
@@ -366,7 +367,7 @@ class ServerProcess : public ::testing::Test {
  protected:
   // Starts the program and waits for its port. Its files may grow to so many bytes; 0: to any size.
   std::uint16_t start(std::vector<std::string> arguments, const std::string& journal = "none",
-                      rlim_t file_bytes = 0) {
+                      std::uint64_t file_bytes = 0) {
     folder_ =
         std::filesystem::temp_directory_path() / ("trocar_server_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
@@ -378,18 +379,15 @@ class ServerProcess : public ::testing::Test {
           std::string("--log-level"), std::string("off"), std::string("--ready-file"),
           ready.string(), std::string("--summary"), (folder_ / "summary.json").string()})
       arguments.push_back(more);
-    std::vector<char*> argv;
-    const std::string program = TROCAR_BINARY_DIR "/trocar-server";
-    argv.push_back(const_cast<char*>(program.c_str()));
-    for (auto& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    pid_ = ::fork();
-    if (pid_ == 0) {
-      const rlimit limit{file_bytes, file_bytes};
-      if (file_bytes > 0) ::setrlimit(RLIMIT_FSIZE, &limit);
-      ::execv(program.c_str(), argv.data());
-      ::_exit(127);
-    }
+    process::Command command{.words = {TROCAR_BINARY_DIR "/trocar-server"},
+                             .out = STDOUT_FILENO,
+                             .errors = STDERR_FILENO};
+    if (file_bytes > 0)
+      command.words = {"prlimit", "--fsize=" + std::to_string(file_bytes), command.words.front()};
+    command.words.insert(command.words.end(), arguments.begin(), arguments.end());
+    auto child = process::Child::start(command);
+    EXPECT_TRUE(child) << child.error().message;
+    child_.emplace(std::move(*child));
     for (int i = 0; i < 2000 && !std::filesystem::exists(ready); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     std::ifstream in(ready);
@@ -397,12 +395,7 @@ class ServerProcess : public ::testing::Test {
     in >> port;
     return port;
   }
-  int wait_for_exit() {
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = 0;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
+  int wait_for_exit() { return child_->wait().exit_code.value_or(-1); }
   std::string summary() const {
     std::ifstream in(folder_ / "summary.json");
     std::stringstream text;
@@ -410,16 +403,13 @@ class ServerProcess : public ::testing::Test {
     return text.str();
   }
   void TearDown() override {
-    if (pid_ > 0) {
-      ::kill(pid_, SIGKILL);
-      ::waitpid(pid_, nullptr, 0);
-    }
+    child_.reset();
     std::filesystem::remove_all(folder_);
   }
 
   std::filesystem::path folder_;
   std::string journal_;
-  pid_t pid_ = 0;
+  std::optional<process::Child> child_;
 };
 
 TEST_F(ServerProcess, sigterm_asks_for_the_crc_says_goodbye_and_exits_with_0) {
@@ -447,7 +437,7 @@ TEST_F(ServerProcess, sigterm_asks_for_the_crc_says_goodbye_and_exits_with_0) {
     ASSERT_TRUE(client.follow());
   }
   EXPECT_NE(client.surface, wire::QuantisedSurface(client.surface.size())) << "nothing moved";
-  ::kill(pid_, SIGTERM);
+  child_->signal(SIGTERM);
   std::optional<proto::Goodbye> goodbye;
   while (auto message = client.receive()) {
     if (message->has_goodbye()) goodbye = message->goodbye();
@@ -477,9 +467,9 @@ TEST_F(ServerProcess, more_signals_do_not_cut_the_end_of_the_recording_short) {
   ASSERT_NE(port, 0);
   RawClient client(port);
   ASSERT_TRUE(client.join("Anna", proto::ROLE_SURGEON));
-  for (int i = 0; i < 3; ++i) ::kill(pid_, i == 1 ? SIGINT : SIGTERM);
+  for (int i = 0; i < 3; ++i) child_->signal(i == 1 ? SIGINT : SIGTERM);
   while (client.receive())  // it answers nothing, so the end waits for it
-    ::kill(pid_, SIGTERM);
+    child_->signal(SIGTERM);
   EXPECT_EQ(wait_for_exit(), 0);
   const auto recorded = journal::McapReader::open(journal_);
   ASSERT_TRUE(recorded.ok());
@@ -499,7 +489,7 @@ TEST_F(ServerProcess, a_limit_of_file_sizes_ends_the_recording_and_nothing_else)
   }
   EXPECT_NE(state.text().find("File too large"), std::string::npos) << state.text();
   EXPECT_TRUE(client.receive(proto::Envelope::kSurfaceFrame)) << "the session goes on";
-  ::kill(pid_, SIGTERM);
+  child_->signal(SIGTERM);
   while (client.receive()) {
   }
   EXPECT_EQ(wait_for_exit(), 5);
@@ -514,7 +504,7 @@ TEST_F(ServerProcess, a_taken_port_is_exit_code_5) {
       "--listen 127.0.0.1:" +
       std::to_string(port) + " 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(second.c_str())), 5);
-  ::kill(pid_, SIGTERM);
+  child_->signal(SIGTERM);
   EXPECT_EQ(wait_for_exit(), 0);
 }
 

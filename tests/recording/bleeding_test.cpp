@@ -6,7 +6,6 @@
 
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/resume.h"
 #include "server/session/recording/verify.h"
 #include "tests/recording/recorded_simulation.h"
@@ -118,7 +117,8 @@ TEST_F(BledRecording, AfterAGapItGoesOnFromTheNextSnapshot) {
 TEST_F(BledRecording, ASessionGoesOnWithItsBlood) {
   auto resumed = resume_session(sound(), {});
   ASSERT_TRUE(resumed.ok()) << resumed.error().message;
-  ASSERT_TRUE(resumed->bleeding);
+  const auto& blood = resumed->simulation.state().blood;
+  ASSERT_TRUE(blood);
   auto journal = journal::SessionJournal::open(sound());
   ASSERT_TRUE(journal.ok());
   std::uint32_t last_crc = 0;
@@ -127,8 +127,8 @@ TEST_F(BledRecording, ASessionGoesOnWithItsBlood) {
     return true;
   };
   ASSERT_TRUE((*journal)->read_surface_deltas(0, kRecordedTicks, visit).ok());
-  EXPECT_EQ(wire::blood_crc(resumed->bleeding->blood().levels), last_crc);
-  EXPECT_GT(resumed->bleeding->blood().shed_pl, 0);
+  EXPECT_EQ(wire::blood_crc(blood->levels), last_crc);
+  EXPECT_GT(blood->shed_pl, 0);
 }
 
 }  // namespace

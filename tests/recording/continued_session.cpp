@@ -31,20 +31,15 @@ void go_on_with(const std::string& part, const std::string& whole, const std::st
   auto& simulation = session->simulation;
   Beginning beginning;
   beginning.continues = session->continuation;
-  if (session->bleeding) beginning.bleeding = session->bleeding->rules();
+  beginning.bleeding = simulation.rules().bleeding;
   auto recorder = Recorder::create(next, simulation.organ(), simulation.layout(), beginning);
   ASSERT_TRUE(recorder.ok()) << recorder.error().message;
   hands::TickInputs leaves;
   for (const auto& who : session->participants) leaves.leaves.push_back(who.slot);
   if (has_people) (*recorder)->record_participants(session->participants, 0);
-  Bytes state, blood;
+  Bytes state;
   simulation.write_snapshot(state);
   auto snapshot = std::make_shared<const Bytes>(std::move(state));
-  std::shared_ptr<const Bytes> blood_snapshot;
-  if (session->bleeding) {
-    session->bleeding->write_state(blood);
-    blood_snapshot = std::make_shared<const Bytes>(std::move(blood));
-  }
   auto journal = journal::SessionJournal::open(whole);
   ASSERT_TRUE(journal.ok());
   std::vector<step::TickRecord> records;
@@ -60,12 +55,9 @@ void go_on_with(const std::string& part, const std::string& whole, const std::st
     leaves.clear();
     auto frame = simulation.pop_frame();
     if (!frame) return Status();
-    if (session->bleeding)
-      session->bleeding->observe(*frame, simulation.layout(), simulation.state().tools);
     frame->records = std::exchange(records, {});
     frame->snapshot = std::exchange(snapshot, nullptr);
     frame->snapshot_tick = session->continuation.tick;
-    frame->bleeding_snapshot = std::exchange(blood_snapshot, nullptr);
     (*recorder)->record_frame(frame);
     return Status();
   });

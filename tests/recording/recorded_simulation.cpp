@@ -7,7 +7,6 @@
 #include "common/journal/session_journal.h"
 #include "common/journal/session_journal_writer.h"
 #include "server/organs/catalogue/builtin_organs.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/recorder.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/support/files.h"
@@ -49,10 +48,9 @@ wire::HandReport report_until(std::uint64_t time_us) {
 }  // namespace
 
 void record_simulation(const std::string& path, Tick dropped_at, bool bleeds) {
-  step::Simulation simulation(*catalogue::make_liver(800));
-  std::optional<bleeding::Bleeding> bleeding;
   Beginning beginning;
-  if (bleeds) bleeding.emplace(*(beginning.bleeding = bleeding::Rules{}));
+  if (bleeds) beginning.bleeding.emplace();
+  step::Simulation simulation(*catalogue::make_liver(800), 1, {.bleeding = beginning.bleeding});
   auto recorder = Recorder::create(path, simulation.organ(), simulation.layout(), beginning);
   ASSERT_TRUE(recorder.ok()) << recorder.error().message;
   Vec3f top{0, -1, 0};
@@ -70,14 +68,6 @@ void record_simulation(const std::string& path, Tick dropped_at, bool bleeds) {
   (*recorder)->record_participants(present, 0);
 
   Bytes state;
-  std::shared_ptr<const Bytes> blood_snapshot;
-  const auto take_blood = [&] {
-    if (!bleeding) return;
-    Bytes blood;
-    bleeding->write_state(blood);
-    blood_snapshot = std::make_shared<const Bytes>(std::move(blood));
-  };
-  take_blood();
   simulation.write_snapshot(state);
   auto snapshot = std::make_shared<const Bytes>(state);
   Tick snapshot_tick = 0;
@@ -97,15 +87,12 @@ void record_simulation(const std::string& path, Tick dropped_at, bool bleeds) {
       simulation.write_snapshot(state);
       snapshot = std::make_shared<const Bytes>(state);
       snapshot_tick = tick;
-      take_blood();
     }
     auto frame = simulation.pop_frame();
     if (!frame) continue;
-    if (bleeding) bleeding->observe(*frame, simulation.layout(), simulation.state().tools);
     frame->records = std::exchange(records, {});
     frame->snapshot = std::exchange(snapshot, nullptr);
     frame->snapshot_tick = snapshot_tick;
-    frame->bleeding_snapshot = std::exchange(blood_snapshot, nullptr);
     if (tick == dropped_at) {
       frame->snapshot = std::make_shared<const Bytes>(Recorder::kQueueBytes + 1);
       frame->snapshot_tick = tick;

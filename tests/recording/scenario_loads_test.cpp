@@ -250,7 +250,7 @@ TEST_F(ScenarioLoads, ACutUnderLoadsIsVerifiedWhole) {
   auto loads = recorded_loads(**journal, *organ, "");
   ASSERT_TRUE(loads.ok()) << loads.error().message;
   const auto nodes = organ->mesh.node_count();
-  step::Simulation simulation(*organ, 1, {}, *loads);
+  step::Simulation simulation(*organ, 1, {.loads = *loads});
   const auto snapshot = (*journal)->snapshot_before(kTicks);
   ASSERT_TRUE(snapshot.ok() && *snapshot);
   EXPECT_EQ((*snapshot)->tick(), kSnapshotTick);

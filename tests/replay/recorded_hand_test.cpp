@@ -167,7 +167,7 @@ TEST_F(RecordedHands, ASampleThatIsNoPlaceIsRefused) {
   record([&](proto::TickRecord& record) {
     if (++count == 10) record.mutable_sample(0)->mutable_position_m()->set_y(NAN);
   });
-  EXPECT_NE(why("Anna").find("no place of a tool"), std::string::npos) << why("Anna");
+  EXPECT_NE(why("Anna").find("no pose of a tool"), std::string::npos) << why("Anna");
 }
 
 TEST(HandInFile, IsParsed) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <thread>
 
@@ -177,7 +178,7 @@ fields_s = [0, 0.005]
   for (int i = 0; i < 6000 && !fs::exists(out / "field_0000005ms.vtu"); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   ASSERT_TRUE(fs::exists(out / "field_0000005ms.vtu")) << log();
-  kill(pid_, SIGINT);
+  child_->signal(SIGINT);
   ASSERT_EQ(wait(), 0) << log();
   EXPECT_NE(log().find("stopped at "), std::string::npos) << log();
 

@@ -52,14 +52,13 @@ class FreeBlock : public ::testing::TestWithParam<int> {};
 TEST_P(FreeBlock, KeepsMomentumAndSpinAndGainsNoEnergy) {
   Simulation simulation(free_block(GetParam()));
   Random random(7);
-  auto& world = simulation.editable_state().world;
-  for (std::size_t n = 0; n < world.node_count(); ++n) {
+  std::vector<Vec3f> velocities;
+  for (const Vec3f arm : simulation.state().world.rest_positions) {
     const auto any = [&] { return static_cast<float>(random.between(-0.05, 0.05)); };
-    const Vec3f arm = world.rest_positions[n];
-    world.velocities[n] =
-        Vec3f{0.3f, 0.1f, -0.2f} + cross(Vec3f{8, -3, 5}, arm) + Vec3f{any(), any(), any()};
+    velocities.push_back(Vec3f{0.3f, 0.1f, -0.2f} + cross(Vec3f{8, -3, 5}, arm) +
+                         Vec3f{any(), any(), any()});
   }
-  simulation.resume();
+  simulation.start_relaxed(std::vector<Vec3f>(velocities.size()), velocities);
   const auto nodes = all_nodes(simulation.state().world);
   auto last = pieces::motion_of(nodes, simulation.state().world);
   const auto first = last;
@@ -89,11 +88,10 @@ TEST(FreePiece, HasNoStressThatRelaxed) {
   auto organ = free_block(3);
   material::use_measured(*material::find_measured_material("human_liver_nava2008"), organ.material);
   Simulation simulation(std::move(organ));
-  auto& begun = simulation.editable_state().world;
-  for (std::size_t n = 0; n < begun.node_count(); ++n)
-    begun.velocities[n] = begun.rest_positions[n] * 20.0f;
-  simulation.resume();
   const auto& world = simulation.state().world;
+  std::vector<Vec3f> velocities;
+  for (const auto& place : world.rest_positions) velocities.push_back(place * 20.0f);
+  simulation.start_relaxed(std::vector<Vec3f>(velocities.size()), velocities);
   ASSERT_FALSE(world.relaxation.is_empty());
   float stretched = 0;
   for (int tick = 0; tick < 30; ++tick) {

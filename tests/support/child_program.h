@@ -2,11 +2,12 @@
 
 // One of the project's programs as a child process.
 
-#include <sys/types.h>
-
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "common/process/process.h"
 
 namespace trocar::testing {
 
@@ -16,20 +17,15 @@ class Program {
   // `name` in build/<preset>/bin; output goes to `log`. Exit code 127 if it cannot be started.
   Program(const std::string& name, const std::vector<std::string>& arguments,
           const std::filesystem::path& log);
-  Program(Program&& other) noexcept;
-  Program& operator=(Program&&) = delete;
-  ~Program();
 
-  void signal(int number) const;
+  void signal(int number) const { child_->signal(number); }
   // Exit code, 128 + signal if one ended it, or -1 after `seconds`.
   int wait(double seconds);
-  bool is_running();
-  pid_t process() const { return pid_; }
+  bool is_running() { return child_ && !child_->poll(); }
+  pid_t process() const { return child_->pid(); }
 
  private:
-  pid_t pid_ = -1;
-  int status_ = 0;
-  bool has_ended_ = false;
+  std::optional<process::Child> child_;  // nothing: it cannot be started
 };
 
 }  // namespace trocar::testing

@@ -3,19 +3,19 @@
 // A program of ours as a process, in a folder of the test's own that goes when the test ends.
 // Output and errors go to one log.
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "common/process/process.h"
 
 namespace trocar::testing {
 
@@ -25,31 +25,20 @@ class ProgramFixture : public ::testing::Test {
     std::filesystem::create_directories(folder_);
   }
   ~ProgramFixture() override {
-    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
+    child_.reset();
     std::filesystem::remove_all(folder_);
   }
 
   void start(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), TROCAR_BINARY_DIR "/" + program_);
-    std::vector<char*> argv;
-    for (auto& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 1, (folder_ / "log").c_str(),
-                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    posix_spawn_file_actions_adddup2(&actions, 1, 2);
-    ASSERT_EQ(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ), 0);
-    posix_spawn_file_actions_destroy(&actions);
+    const std::ofstream emptied(folder_ / "log");
+    auto child = process::Child::start({.words = std::move(arguments), .log = folder_ / "log"});
+    ASSERT_TRUE(child) << child.error().message;
+    child_.emplace(std::move(*child));
   }
   int wait() {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    const auto ending = child_->wait();
+    return ending.exit_code.value_or(128 + ending.signal);
   }
   int run(std::vector<std::string> arguments) {
     start(std::move(arguments));
@@ -82,7 +71,7 @@ class ProgramFixture : public ::testing::Test {
       std::filesystem::temp_directory_path() /
       ("trocar-program-" + std::to_string(getpid()) + "-" +
        ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  pid_t pid_ = -1;
+  std::optional<process::Child> child_;
 };
 
 }  // namespace trocar::testing

@@ -1,9 +1,6 @@
 #include "tests/validation/calculix.h"
 
-#include <fcntl.h>
-#include <spawn.h>
 #include <spdlog/fmt/fmt.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +9,7 @@
 #include <sstream>
 
 #include "common/base/text_file.h"
+#include "common/process/process.h"
 
 namespace trocar::validation {
 namespace {
@@ -19,24 +17,6 @@ namespace {
 constexpr const char* kSolverProgram = "ccx";
 // Orders above the first have no volumetric term of their own.
 constexpr double kNoVolume = 1e20;
-
-// Exit code of the program in the folder; output to a file there. -1: it could not be started.
-int run_in(const std::filesystem::path& folder, std::vector<std::string> arguments) {
-  std::vector<char*> argv;
-  for (auto& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  posix_spawn_file_actions_addopen(&actions, 1, "ccx.log", O_WRONLY | O_CREAT | O_TRUNC, 0644);
-  posix_spawn_file_actions_adddup2(&actions, 1, 2);
-  pid_t pid = -1;
-  const int failed = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  int status = 0;
-  if (failed != 0 || waitpid(pid, &status, 0) != pid) return -1;
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
 
 std::string mesh_of(const finite_elements::ElementMesh& mesh) {
   std::string text = "*NODE, NSET=ALL\n";
@@ -114,7 +94,9 @@ Result<std::string> calculix_input(const finite_elements::Problem& problem,
 Result<Field> run_calculix(const std::filesystem::path& folder, const std::string& name,
                            const std::string& input, std::size_t node_count) {
   if (auto s = write_text_file(folder / (name + ".inp"), input); !s) return s.error();
-  if (run_in(folder, {kSolverProgram, "-i", name}) != 0)
+  auto solver = process::Child::start(
+      {.words = {"env", "-C", folder, kSolverProgram, "-i", name}, .log = folder / "ccx.log"});
+  if (!solver || solver->wait().exit_code != 0)
     return Error{ErrorCode::BadFile,
                  (folder / "ccx.log").string() + ": CalculiX did not come to an end"};
   return read_displacements(folder / (name + ".dat"), node_count);

@@ -80,7 +80,7 @@ class LiveHand {
   // averaged strain; empty: as in a session.
   LiveCourse press(const Decide& decide, bool is_controlled = false,
                    std::optional<dynamics::StrainScheme> scheme = {}) const {
-    step::Simulation simulation(organ_, 1, {}, {}, scheme);
+    step::Simulation simulation(organ_, 1, {.strain_scheme = scheme});
     std::optional<control::RateController> controller;
     if (is_controlled)
       controller.emplace(

@@ -94,19 +94,45 @@ class Check:
         self.failures.append(name)
         return False
 
-    def format(self) -> None:
-        self.step("Format")
-        names = subprocess.run(["git", "ls-files", "*.h", "*.cpp"], cwd=ROOT, capture_output=True, text=True)
+    def sources(self, tops: tuple[str, ...], endings: tuple[str, ...]) -> list[str]:
+        """The files of a checkout below these folders, or of a copy of it; of a change only those that it has."""
+        patterns = [f"{top}/*{ending}" for top in tops for ending in endings]
+        names = subprocess.run(["git", "ls-files", *patterns], cwd=ROOT, capture_output=True, text=True)
         files = names.stdout.split()
         if not files:  # not a checkout
-            files = [str(path.relative_to(ROOT)) for top in ("common", "server", "client", "tests")
-                     for ending in ("*.h", "*.cpp") for path in (ROOT / top).rglob(ending)]
+            files = [str(path.relative_to(ROOT)) for top in tops for ending in endings
+                     for path in (ROOT / top).rglob(f"*{ending}")]
         if self.changed is not None:
             files = [name for name in files if name in self.changed and (ROOT / name).exists()]
+        return files
+
+    def format(self) -> None:
+        self.step("Format")
+        files = self.sources(("common", "server", "client", "tests"), (".h", ".cpp"))
         if files:
             (self.out / "sources").write_text("\0".join(files))
             self.command("format", ["xargs", "-0", "-P", str(os.cpu_count()), "-n", "100", "-a",
                                     str(self.out / "sources"), "clang-format", "--dry-run", "-Werror"])
+        files = self.sources(("client/web/page",), (".ts", ".tsx", ".mjs", ".css", ".html"))
+        if files:
+            self.format_page(files)
+
+    def format_page(self, files: list[str]) -> None:
+        """Prettier comes with the other modules of the page, where its build has them."""
+        modules = ROOT / "build/release/client/web/page"
+        if self.options.with_web:
+            code = subprocess.run([ROOT / "deploy/lib/modules", ROOT / "client/web/page", modules]).returncode
+            if code == 77:
+                self.skips.append("the format of the page: npm cannot reach its registry")
+                return
+            if code:
+                self.failures.append("modules of the page")
+                return
+        prettier = modules / "node_modules/.bin/prettier"
+        if prettier.exists():
+            self.command("format-page", [str(prettier), "--check", *files])
+        else:
+            self.skips.append("the format of the page: --with-web was not given")
 
     def configure(self, preset: str) -> Plan:
         """The plan of a build folder, configured if it is not yet, or not with tests or not with the page."""

@@ -305,7 +305,7 @@ int run(int argc, char** argv) {
   auto* give = app.add_subcommand("export", "Write what a recording holds as a table");
   give->add_option("FILE", path, "a journal (.mcap)")->required();
   give->add_option("--forces", force_table,
-                   "a row for each tool and frame: place, force of the tissue, and what a hand "
+                   "a row for each tool and frame: position, force of the tissue, and what a hand "
                    "felt (CSV)")
       ->type_name("OUT");
   give->add_option("--lesson", lesson_table,

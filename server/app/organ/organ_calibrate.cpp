@@ -105,12 +105,12 @@ void print_reference(const calibration::Reference& reference) {
                   ? ""
                   : ", which is more than a tenth of --error");
   if (reference.places_missed > 0)
-    std::printf("reference: LEFT OUT: %zu places, where it did not reach its tolerance\n",
+    std::printf("reference: LEFT OUT: %zu sites, where it did not reach its tolerance\n",
                 reference.places_missed);
 }
 
 void print_check(const calibration::Checks& checks) {
-  std::printf("at other places, slower and aslant, with what is chosen from the force:\n");
+  std::printf("at other sites, slower and aslant, with what is chosen from the force:\n");
   print_reference(checks.reference);
   for (const auto& c : checks.ranges) {
     if (c.places == 0) continue;
@@ -140,10 +140,10 @@ void add_calibrate_command(CLI::App& app, CalibrateCommand& command) {
   sub->add_option("--error", command.error_percent, "error of the contact force that may remain, %")
       ->type_name("PERCENT")
       ->capture_default_str();
-  sub->add_option("--places", command.settings.places, "of the surface to press")
+  sub->add_option("--places", command.settings.places, "sites of the surface to press")
       ->type_name("N")
       ->capture_default_str();
-  sub->add_option("--seed", command.settings.seed, "draws the first place")
+  sub->add_option("--seed", command.settings.seed, "draws the first site")
       ->type_name("S")
       ->capture_default_str();
   sub->add_option("--radius", command.radius_mm,
@@ -153,7 +153,7 @@ void add_calibrate_command(CLI::App& app, CalibrateCommand& command) {
       ->type_name("MM")
       ->capture_default_str();
   sub->add_option("--check", command.check_places,
-                  "other places at which the result is tried out, 0: none")
+                  "other sites at which the result is tried out, 0: none")
       ->type_name("N")
       ->capture_default_str();
   sub->add_option("--workers", command.settings.workers, "threads that share a tick's work")
@@ -179,18 +179,18 @@ Status run_calibrate(CalibrateCommand command) {
 
   const auto begin = monotonic_ns();
   const auto cpu = thread_cpu_ns();
-  const auto found = calibration::calibrate(*organ, settings, progress_of("pressing, place"));
+  const auto found = calibration::calibrate(*organ, settings, progress_of("pressing, site"));
   if (found.table.empty())
     return Error{ErrorCode::BadFile,
                  command.organ +
-                     ": no place could be pressed until the reference converged, try "
+                     ": no site could be pressed until the reference converged, try "
                      "another --radius or --seed"};
   const double wall_s = static_cast<double>(monotonic_ns() - begin) * 1e-9;
   const double cpu_s = static_cast<double>(thread_cpu_ns() - cpu) * 1e-9;
   const auto plain_bytes = organ::pack_organ(*organ).size();
   organ->depth_table = found.table;
   if (auto s = organ::write_organ(out, *organ); !s) return s;
-  std::printf("%s: %u places pressed %.1f mm deep with a tip of %.1f mm, %zu left out\n",
+  std::printf("%s: %u sites pressed %.1f mm deep with a tip of %.1f mm, %zu left out\n",
               organ->name.c_str(), found.table.places, command.depth_mm,
               found.table.tool_radius_m * 1e3, found.places_left_out);
   print_reference(found.reference);
@@ -200,7 +200,7 @@ Status run_calibrate(CalibrateCommand command) {
   if (auto s = plot::write_svg(folder / "errors.svg", to_plot(found, settings.error)); !s) return s;
   if (command.check_places > 0) {
     const auto checks = calibration::check(*organ, found.table, settings, command.check_places,
-                                           progress_of("checking, place"));
+                                           progress_of("checking, site"));
     print_check(checks);
     if (auto s = write_text_file(folder / "check.csv", check_csv(checks.ranges)); !s) return s;
   }

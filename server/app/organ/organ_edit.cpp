@@ -2,14 +2,14 @@
 
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/own_folder.h"
+#include "common/process/process.h"
 #include "server/app/organ/organ_print.h"
 #include "server/app/organ/program_name.h"
 
@@ -47,24 +47,22 @@ Status run_edit(const edit_command::EditCommand& command, int argc, char** argv)
     return Error{ErrorCode::ResourceMissing,
                  "edit: there is no display for a window: start it in a desktop session, or say "
                  "--headless with --hold, --release, --region, --give or --material"};
-  auto program = (own_folder() / kWindowProgram).string();
+  const auto program = (own_folder() / kWindowProgram).string();
   if (::access(program.c_str(), X_OK) != 0)
     return Error{ErrorCode::ResourceMissing,
                  std::string("edit: the window's program ") + kWindowProgram +
                      " is not beside this one: install trocar-client, or build with "
                      "TROCAR_CLIENT=ON; --headless needs none"};
-  std::vector<char*> words{program.data()};
+  std::vector<std::string> words{program};
   bool has_left_out_edit = false;
   for (int i = 1; i < argc; ++i) {
     if (!has_left_out_edit && std::string_view(argv[i]) == "edit")
       has_left_out_edit = true;
     else
-      words.push_back(argv[i]);
+      words.emplace_back(argv[i]);
   }
-  words.push_back(nullptr);
-  ::execv(program.c_str(), words.data());
-  return Error{ErrorCode::ResourceMissing,
-               "edit: " + program + " does not start: " + std::strerror(errno)};
+  const auto failed = process::become(words);
+  return Error{failed.code, "edit: " + failed.message};
 }
 
 }  // namespace trocar::app

@@ -70,7 +70,7 @@ void add_embed_options(CLI::App& app, EmbedCommand& command) {
   auto* embed = app.add_option(
       "--embed", command.file,
       "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
-      ".obj, .ply or .glb, in the unit and place of FILE; at most 200,000 triangles");
+      ".obj, .ply or .glb, in the unit and position of FILE; at most 200,000 triangles");
   embed->type_name("FINE");
   app.add_option("--embed-picture", command.picture,
                  "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB "

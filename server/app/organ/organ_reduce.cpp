@@ -57,7 +57,7 @@ const char* name_of(Stage stage) {
     case Stage::Creep:
       return "creep, node";
     case Stage::Check:
-      return "check, place";
+      return "check, site";
   }
   return "";
 }
@@ -325,9 +325,9 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   sub->add_option("--results", command.folder,
                   "folder of the comparison with the full model [out/reduce-<organ>]")
       ->type_name("DIR");
-  number("--places", s.places, "of the surface that are pressed", "N");
+  number("--places", s.places, "sites of the surface that are pressed", "N");
   number("--directions", s.directions,
-         "of the force at each place: straight, aslant, every fifth pulls", "N");
+         "of the force at each site: straight, aslant, every fifth pulls", "N");
   number("--magnitudes", s.magnitudes, "of the force in each direction, equal parts", "N");
   number("--force", s.force_n, "the largest", "NEWTON");
   number("--radius", command.radius_mm, "of the patch that is pressed; 0: single nodes", "MM");
@@ -337,9 +337,9 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--influence", command.influence_mm,
          "radius around them in which nodes have a growth of their own", "MM");
   number("--check", command.check_places,
-         "places outside the training at which the result is compared; 0: none", "N");
+         "sites outside the training at which the result is compared; 0: none", "N");
   number("--check-creep", command.check_creep, "of these at which creep is compared, too", "N");
-  number("--seed", s.seed, "chooses the first place", "S");
+  number("--seed", s.seed, "chooses the first site", "S");
   number("--threads", s.threads, "of the full model", "N");
 }
 

@@ -235,7 +235,7 @@ void RelayServer::note_ready(std::uint16_t port) {
   if (auto link = secure::write_link_file(port, {{"observer", access_.code}}); link)
     link_file_ = std::move(*link);
   else
-    log::warn("no link file, so clients on this machine need --join, too: {}",
+    log::warn("no code file, so clients on this machine need --join, too: {}",
               link.error().message);
   std::fputs(invitation(options_, access_.code, port).c_str(), stdout);
   std::fflush(stdout);

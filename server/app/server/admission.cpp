@@ -135,7 +135,7 @@ Status Admission::issue_codes(std::uint16_t port) {
   if (auto link = secure::write_link_file(port, codes_); link)
     link_file_ = std::move(*link);
   else
-    log::warn("no link file, so clients on this machine need --join, too: {}",
+    log::warn("no code file, so clients on this machine need --join, too: {}",
               link.error().message);
   return {};
 }

@@ -15,8 +15,8 @@
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
-#include "server/session/bleeding/rules.h"
 #include "server/session/participants/roster.h"
+#include "server/tissue/bleeding/rules.h"
 #include "server/tissue/step/published_frame.h"
 
 namespace trocar::app {

@@ -34,7 +34,7 @@ Result<std::vector<KeptPlace>> read_places(const std::filesystem::path& file) {
   if (!text) return text.error();
   const auto bad = [&](const std::string& what) {
     return Error{ErrorCode::BadFile,
-                 file.string() + ": is no list of places (" + what + "): remove it"};
+                 file.string() + ": is no list of kept seats (" + what + "): remove it"};
   };
   try {
     const auto json = Json::parse(*text);
@@ -43,7 +43,7 @@ Result<std::vector<KeptPlace>> read_places(const std::filesystem::path& file) {
       KeptPlace place{.slot = {whole_number<std::uint8_t>(entry, "slot")},
                       .name = entry.at("name").get<std::string>()};
       const auto token = secure::from_hex(entry.at("token").get<std::string>());
-      if (!place.slot.is_valid() || token.size() != place.token.size()) return bad("a place");
+      if (!place.slot.is_valid() || token.size() != place.token.size()) return bad("a seat");
       std::ranges::copy(token, place.token.begin());
       place.code = whole_number<std::uint32_t>(entry, "code");
       places.push_back(std::move(place));

@@ -99,7 +99,7 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
       ->check(CLI::IsMember({"surgeon", "assistant", "instructor", "observer"}));
   access
       ->add_option("--return-seconds", options.return_seconds,
-                   "how long somebody's place is kept when the connection breaks, 0: not")
+                   "how long somebody's seat is kept when the connection breaks, 0: not")
       ->type_name("N")
       ->check(CLI::Range(0, 3600))
       ->capture_default_str();

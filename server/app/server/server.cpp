@@ -172,10 +172,8 @@ Status Server::open() {
   tcp_ = std::move(*listening);
   connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
 
-  const auto bleeding =
-      start_.bleeding ? std::optional(start_.bleeding->rules()) : std::optional<bleeding::Rules>();
-  auto journal =
-      open_journal(options_.journal, organ, layout, start_.continues, bleeding, start_.key);
+  auto journal = open_journal(options_.journal, organ, layout, start_.continues,
+                              start_.simulation.rules().bleeding, start_.key);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
@@ -242,7 +240,7 @@ void Server::restore_people() {
   }
   for (const auto slot : start_.unnamed_hands) leave(slot);
   if (!start_.participants.empty())
-    log::info("{} of {} participants may come back to their places for {} s", restored,
+    log::info("{} of {} participants may come back to their seats for {} s", restored,
               start_.participants.size(), options_.access.return_seconds);
 }
 
@@ -302,7 +300,6 @@ step::TickDecisions Server::most_decisions() const {
 LoopOptions Server::loop_options() {
   const auto decisions = most_decisions();
   LoopOptions loop{.decisions = decisions, .pace = static_cast<float>(options_.pace)};
-  if (start_.bleeding) loop.bleeding = &*start_.bleeding;
   if (options_.workers == 0) loop.most_workers = simulation_.workers();
   if (options_.seconds > 0)
     loop.tick_count = simulation_.current_tick() + ticks_of(options_.seconds);

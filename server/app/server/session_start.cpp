@@ -31,22 +31,26 @@ Result<organ::Organ> read_organ(const ServerOptions& options) {
 }
 
 // A session bleeds if its lesson does, or if it is asked to; vessels are the lesson's.
-std::optional<bleeding::Bleeding> begin_bleeding(const ServerOptions& options) {
+std::optional<bleeding::Rules> bleeding_rules(const ServerOptions& options) {
   if (!options.bleeds && !(options.lesson && options.lesson->bleeds)) return {};
-  return bleeding::Bleeding(options.lesson ? bleeding::rules_of(*options.lesson)
-                                           : bleeding::Rules{});
-}
-
-Result<SessionStart> begin_tissue(const ServerOptions& options) {
-  auto organ = read_organ(options);
-  if (!organ) return organ.error();
-  return SessionStart{.simulation = step::Simulation(std::move(*organ), most_workers(options))};
+  bleeding::Rules rules;
+  if (!options.lesson) return rules;
+  for (const auto& structure : options.lesson->structures)
+    if (structure.vessel_pressure_pa > 0)
+      rules.vessels.push_back({.name = structure.name,
+                               .from_m = structure.from_m,
+                               .to_m = structure.to_m,
+                               .radius_m = structure.radius_m,
+                               .pressure_pa = structure.vessel_pressure_pa,
+                               .most_flow_m3_s = structure.vessel_flow_m3_s});
+  return rules;
 }
 
 Result<SessionStart> begin(const ServerOptions& options) {
-  auto start = begin_tissue(options);
-  if (start) start->bleeding = begin_bleeding(options);
-  return start;
+  auto organ = read_organ(options);
+  if (!organ) return organ.error();
+  return SessionStart{.simulation = step::Simulation(std::move(*organ), most_workers(options),
+                                                     {.bleeding = bleeding_rules(options)})};
 }
 
 // Somebody who names an organ means that one.
@@ -94,10 +98,9 @@ Result<SessionStart> go_on(const ServerOptions& options) {
     return Error{ErrorCode::Usage, "--lesson: the session of " + options.resume_file +
                                        " gives no lesson, leave out --lesson"};
   }
-  if (options.bleeds && !session->bleeding)
+  if (options.bleeds && !start.simulation.rules().bleeding)
     return Error{ErrorCode::Usage, "--bleeding: the session of " + options.resume_file +
                                        " does not bleed, leave out --bleeding"};
-  start.bleeding = std::move(session->bleeding);
   return start;
 }
 

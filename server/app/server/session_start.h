@@ -12,7 +12,6 @@
 #include "common/secure/signing.h"
 #include "server/app/server/options.h"
 #include "server/organs/organ/organ.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/simulation.h"
 
@@ -20,8 +19,7 @@ namespace trocar::app {
 
 struct SessionStart {
   step::Simulation simulation;
-  std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
-  std::optional<secure::SigningKey> key;       // signs the recording
+  std::optional<secure::SigningKey> key;  // signs the recording
   // The rest is of a session that goes on.
   std::optional<journal::Continuation> continues;
   std::shared_ptr<lesson::Course> course;               // null: no lesson had begun

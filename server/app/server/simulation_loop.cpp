@@ -187,15 +187,9 @@ bool SimulationLoop::run_tick() {
 }
 
 void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
-  if (options_.bleeding != nullptr) {
-    const auto begin = thread_cpu_ns();
-    options_.bleeding->observe(*frame, simulation_.layout(), simulation_.state().tools);
-    report_.bleeding_times.add(thread_cpu_ns() - begin);
-  }
   frame->records = std::exchange(records_, {});
   records_.reserve(kTicksPerFrame);
   frame->snapshot = std::exchange(snapshot_, nullptr);
-  frame->bleeding_snapshot = std::exchange(bleeding_snapshot_, nullptr);
   frame->snapshot_tick = snapshot_tick_;
   auto& pace = frame->figures.pace = pace_;
   pace.slow_ticks = slow_ticks_;
@@ -212,11 +206,6 @@ void SimulationLoop::record_snapshot() {
   Bytes bytes;
   simulation_.write_snapshot(bytes);
   snapshot_ = std::make_shared<const Bytes>(std::move(bytes));
-  if (options_.bleeding != nullptr) {
-    Bytes blood;
-    options_.bleeding->write_state(blood);
-    bleeding_snapshot_ = std::make_shared<const Bytes>(std::move(blood));
-  }
   snapshot_tick_ = simulation_.current_tick();
 }
 

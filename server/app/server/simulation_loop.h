@@ -23,7 +23,6 @@
 #include "server/app/server/idle_processors.h"
 #include "server/app/server/journal_sink.h"
 #include "server/app/server/pacer.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
 #include "server/session/control/team_size.h"
@@ -66,8 +65,7 @@ struct LoopReport {
   std::uint32_t max_active_nodes = 0;
   RateReport rate;
   step::SharedFrame last_frame;
-  StageTimes times;                               // of the whole run
-  replication::DurationHistogram bleeding_times;  // thread CPU time of a frame's blood
+  StageTimes times;  // of the whole run
 };
 
 struct LoopOptions {
@@ -76,7 +74,6 @@ struct LoopOptions {
   std::optional<control::RateLimits> rate;
   unsigned most_workers = 0;  // so many share a tick's work at most; 0: all that there are, always
   Tick tick_count = 0;        // end at the first frame at or after this; 0: when told to
-  bleeding::Bleeding* bleeding = nullptr;  // of a session that bleeds; outlives the loop
   std::function<std::uint64_t()> clock_ns = monotonic_ns;  // of what ticks take; tests have others
 };
 
@@ -135,7 +132,6 @@ class SimulationLoop {
   hands::TickInputs inputs_;
   std::vector<step::TickRecord> records_;  // since the last frame
   std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame
-  std::shared_ptr<const Bytes> bleeding_snapshot_;
   Tick snapshot_tick_ = 0;
   StageTimes second_;       // since the last statistics
   wire::PaceFigures pace_;  // of the last full second

@@ -130,14 +130,10 @@ Json blood_figures(const Summary& s) {
   if (!last.figures.blood) return nullptr;
   const auto ml = [](std::uint64_t nl) { return static_cast<double>(nl) * 1e-6; };
   const auto& blood = *last.figures.blood;
-  return {{"shed_ml", ml(blood.shed_nl)},
-          {"on_surface_ml", ml(blood.on_surface_nl)},
-          {"dripped_ml", ml(blood.dripped_nl)},
-          {"sucked_ml", ml(blood.sucked_nl)},
-          {"sources", blood.sources},
-          {"open_vessels", blood.open_vessels},
-          {"levels_crc", hex32(last.blood_crc)},
-          {"frame_cpu_us", times(s.loop.bleeding_times)}};
+  return {{"shed_ml", ml(blood.shed_nl)},       {"on_surface_ml", ml(blood.on_surface_nl)},
+          {"dripped_ml", ml(blood.dripped_nl)}, {"sucked_ml", ml(blood.sucked_nl)},
+          {"sources", blood.sources},           {"open_vessels", blood.open_vessels},
+          {"levels_crc", hex32(last.blood_crc)}};
 }
 
 }  // namespace

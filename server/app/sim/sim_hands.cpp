@@ -119,7 +119,7 @@ Result<step::Simulation> simulation_of(const HandsCommand& command, journal::Ses
     }
     *organ = std::move(*other);
   }
-  step::Simulation simulation(std::move(*organ), threads, {}, std::move(*loads));
+  step::Simulation simulation(std::move(*organ), threads, {.loads = std::move(*loads)});
   if (has_recorded_start(command, info)) {
     if (auto s = restore_start(source, path, simulation); !s) return s.error();
   } else if (info.starts_from_snapshot) {

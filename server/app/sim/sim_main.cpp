@@ -250,7 +250,7 @@ Result<std::filesystem::path> make_folder(const std::filesystem::path& folder) {
 
 Status run_recording(const Options& options) {
   if (!options.scenario.empty())
-    return Error{ErrorCode::Usage, "--hands: stands in place of a scenario, leave one out"};
+    return Error{ErrorCode::Usage, "--hands: stands instead of a scenario, leave one out"};
   if (options.solver != "live" || options.is_plotted)
     return Error{ErrorCode::Usage, "--hands: has neither --solver nor --plot, leave them out"};
   const std::filesystem::path named =

@@ -150,7 +150,7 @@ void RecordingChecks::fail(const Task& task, const std::string& why) {
 }
 
 void RecordingChecks::keep(const Task& task, const CheckProcess::Outcome& outcome) {
-  if (outcome.exit_code < 0) return fail(task, "the check was ended by a signal");
+  if (!outcome.exit_code) return fail(task, "the check was ended by a signal");
   try {
     const auto report = Json::parse(outcome.output);
     const auto& difference = report.at("first_difference");

@@ -1,21 +1,14 @@
 #include "server/hall/processes/server_process.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <spawn.h>
 #include <sys/syscall.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <thread>
 #include <utility>
-
-extern char** environ;
 
 namespace trocar::hall {
 namespace {
@@ -72,55 +65,23 @@ std::string command_line(const std::vector<std::string>& arguments) {
   return text;
 }
 
-struct SpawnSettings {
-  posix_spawn_file_actions_t files{};
-  posix_spawnattr_t attributes{};
-
-  explicit SpawnSettings(const std::string& log) {
-    posix_spawn_file_actions_init(&files);
-    posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&files, 1, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
-    posix_spawn_file_actions_adddup2(&files, 1, 2);
-    posix_spawn_file_actions_addclosefrom_np(&files, 3);
-    posix_spawnattr_init(&attributes);
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setflags(&attributes,
-                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  }
-  ~SpawnSettings() {
-    posix_spawn_file_actions_destroy(&files);
-    posix_spawnattr_destroy(&attributes);
-  }
-  SpawnSettings(const SpawnSettings&) = delete;
-  SpawnSettings& operator=(const SpawnSettings&) = delete;
-};
-
 }  // namespace
 
 Result<ServerProcess> ServerProcess::start(const std::filesystem::path& program,
                                            const std::vector<std::string>& arguments,
                                            const std::filesystem::path& log) {
-  std::vector<std::string> words{program.string()};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> pointers;
-  for (auto& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  const SpawnSettings settings(log.string());
-  pid_t pid = 0;
-  const int failed = ::posix_spawn(&pid, program.c_str(), &settings.files, &settings.attributes,
-                                   pointers.data(), environ);
-  if (failed != 0)
-    return Error{ErrorCode::ResourceMissing, program.string() + ": cannot be started (" +
-                                                 std::strerror(failed) +
-                                                 "): it has to lie beside trocar-hall"};
+  process::Command command{.words = {program.string()}, .log = log, .is_apart = true};
+  command.words.insert(command.words.end(), arguments.begin(), arguments.end());
+  auto child = process::Child::start(command);
+  if (!child)
+    return Error{child.error().code, child.error().message + ": it has to lie beside trocar-hall"};
+  const pid_t pid = child->pid();
   // Its id is its own until somebody has waited for it.
   const auto fields = stat_fields(pid);
   const std::uint64_t started_at = fields.empty() ? 0 : number_in(fields, kStartTime);
-  return ServerProcess({pid, started_at}, open_process(pid), true);
+  ServerProcess server({pid, started_at}, open_process(pid));
+  server.child_.emplace(std::move(*child));
+  return server;
 }
 
 std::optional<ServerProcess> ServerProcess::find(const ProcessId& id,
@@ -129,7 +90,7 @@ std::optional<ServerProcess> ServerProcess::find(const ProcessId& id,
   const int descriptor = open_process(id.pid);
   if (descriptor < 0) return std::nullopt;
   // The descriptor holds the process, whichever it is: what is read now is read of that one.
-  ServerProcess found(id, descriptor, false);
+  ServerProcess found(id, descriptor);
   const auto fields = stat_fields(id.pid);
   if (fields.empty() || number_in(fields, kStartTime) != id.started_at) return std::nullopt;
   const auto said = said_command_line(id.pid);
@@ -142,27 +103,25 @@ std::optional<ServerProcess> ServerProcess::find(const ProcessId& id,
 ServerProcess::ServerProcess(ServerProcess&& other) noexcept
     : id_(other.id_),
       descriptor_(std::exchange(other.descriptor_, -1)),
-      is_child_(other.is_child_) {}
+      child_(std::move(other.child_)) {}
 
 ServerProcess& ServerProcess::operator=(ServerProcess&& other) noexcept {
   std::swap(id_, other.id_);
   std::swap(descriptor_, other.descriptor_);
-  std::swap(is_child_, other.is_child_);
+  std::swap(child_, other.child_);
   return *this;
 }
 
 ServerProcess::~ServerProcess() {
+  if (child_) child_->leave();
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-std::optional<ServerProcess::Ending> ServerProcess::poll() {
-  if (is_child_) {
-    int status = 0;
-    if (::waitpid(id_.pid, &status, WNOHANG) != id_.pid) return std::nullopt;
-    is_child_ = false;
-    id_.started_at = 0;
-    if (WIFEXITED(status)) return Ending{.exit_code = WEXITSTATUS(status), .signal = 0};
-    return Ending{.exit_code = std::nullopt, .signal = WTERMSIG(status)};
+std::optional<process::Ending> ServerProcess::poll() {
+  if (child_) {
+    const auto ending = child_->poll();
+    if (ending) id_.started_at = 0;
+    return ending;
   }
   const auto fields = stat_fields(id_.pid);
   if (!fields.empty() && number_in(fields, kStartTime) == id_.started_at) return std::nullopt;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/process/process.h"
 
 namespace trocar::hall {
 
@@ -25,11 +26,7 @@ struct ProcessId {
 
 class ServerProcess {
  public:
-  // `exit_code` is empty if a signal has ended it, or if another hall had started it.
-  struct Ending {
-    std::optional<int> exit_code;
-    int signal = 0;  // 0: none, or unknown
-  };
+  using Ending = process::Ending;
 
   // Runs `program` with `arguments` as they are, without a shell. Standard output and errors go to
   // the end of `log`, of mode 0600; no other file of this program is open in it. Error: it cannot
@@ -46,7 +43,8 @@ class ServerProcess {
   ~ServerProcess();  // leaves it running
 
   const ProcessId& id() const { return id_; }
-  // Nothing while it runs; does not wait.
+  // Nothing while it runs; does not wait. Of one that another hall had started nobody knows how it
+  // has ended.
   std::optional<Ending> poll();
   // It never reaches another process of that id.
   void signal(int number) const;
@@ -54,12 +52,11 @@ class ServerProcess {
   std::optional<double> processor_seconds() const;
 
  private:
-  ServerProcess(ProcessId id, int descriptor, bool is_child)
-      : id_(id), descriptor_(descriptor), is_child_(is_child) {}
+  ServerProcess(ProcessId id, int descriptor) : id_(id), descriptor_(descriptor) {}
 
   ProcessId id_;
-  int descriptor_ = -1;  // of the process, pidfd_open(2)
-  bool is_child_ = false;
+  int descriptor_ = -1;                  // of the process, pidfd_open(2)
+  std::optional<process::Child> child_;  // nothing: another hall had started it
 };
 
 }  // namespace trocar::hall

@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include "common/base/unfinished_file.h"
+
 namespace trocar::scenario {
 namespace {
 
@@ -14,21 +16,15 @@ constexpr int kVtkLine = 3, kVtkTetra = 10;
 
 template <typename Body>
 Status write_file(const std::filesystem::path& path, Body body) {
-  const std::filesystem::path part = path.string() + ".part";
-  const auto failed = [&] {
-    const std::string why = std::strerror(errno);
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    return Error{ErrorCode::ResourceMissing,
-                 path.string() + ": cannot be written (" + why + "), check the folder"};
-  };
-  std::FILE* file = std::fopen(part.c_str(), "wb");
-  if (file == nullptr) return failed();
-  body(file);
-  const bool is_good = std::ferror(file) == 0;
-  if (std::fclose(file) != 0 || !is_good || std::rename(part.c_str(), path.c_str()) != 0)
-    return failed();
-  return {};
+  UnfinishedFile part(UnfinishedFile::name_for(path));
+  std::FILE* file = std::fopen(part.path().c_str(), "wb");
+  if (file != nullptr) {
+    body(file);
+    const bool is_good = std::ferror(file) == 0;
+    if (std::fclose(file) == 0 && is_good) return part.rename_to(path);
+  }
+  return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written (" +
+                                               std::strerror(errno) + "), check the folder"};
 }
 
 // A mesh as field files hold it: the organ's own, or the one that cuts have left.

@@ -6,7 +6,7 @@
 
 #include "common/base/assert.h"
 #include "server/lab/scenario/relaxed_organ.h"
-#include "server/tissue/contact/update_claims.h"
+#include "server/tissue/contact/contact_list.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/hands/sampling.h"
 
@@ -15,27 +15,6 @@ namespace {
 
 using scenario::kAllAxes;
 
-// With a step of time this long inertia and damping are nothing, so that a step ends in
-// equilibrium.
-constexpr float kStaticStep_s = 100;
-// Without inertia the best over-relaxation is high, and the residual grows before it falls: it is
-// judged from stretch to stretch of sweeps, and lowered where a stretch brought nothing.
-constexpr float kStaticOverRelaxation = 1.85f;
-constexpr float kOverRelaxationStepDown = 0.8f;
-// Springs that are compressed buckle, and sweeps that overshoot may then jump to a far equilibrium,
-// or climb from one to the next: stable tissue loses potential energy from stretch to stretch. One
-// that gains is taken back and done again with shorter steps, which descend if they are short
-// enough.
-constexpr float kOverRelaxationStepBack = 0.8f;
-// Rounding of displacements in float, as a share of the energy.
-constexpr double kEnergySlack = 1e-6;
-constexpr std::uint32_t kSweepsPerRelaxation = 100;
-// A contact that is found changes the equilibrium, and that the contacts. First the tool walks to
-// its new place, as it does in a session, and its claim takes effect.
-constexpr int kMinContactRounds = static_cast<int>(hands::kPoseTicks) + 2;
-constexpr int kMaxContactRounds = 60;
-constexpr float kContactChange_m = 1e-5f;
-constexpr float kNoLimit_m = 10;
 // A paper's subdivision gets a patch of this many mean edges at a time: shorter ones pull the same
 // nodes again and again.
 constexpr double kPatchEdges = 1;
@@ -179,17 +158,19 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
     : resolved_(with_response(std::move(resolved))),
       solver_kind_(solver),
       step_count_(steps_of(scenario().run)),
-      simulation_(resolved_.organ, threads, cutting_of(scenario().run), loads_of(resolved_),
-                  scheme_of(scenario().run, solver)),
-      decisions_(decisions_of(scenario().run, solver, simulation_)) {
+      simulation_(resolved_.organ, threads,
+                  {.cutting = cutting_of(scenario().run),
+                   .loads = loads_of(resolved_),
+                   .strain_scheme = scheme_of(scenario().run, solver)}),
+      decisions_(decisions_of(scenario().run, solver, simulation_)),
+      equilibrium_(simulation_, {.tolerance_n = static_cast<float>(scenario().run.tolerance_n),
+                                 .max_sweeps = scenario().run.max_sweeps}) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
     watched_.push_back(is_reaction(scenario().probes[i])
                            ? simulation_.loads().watch(resolved_.probe_nodes[i])
                            : 0);
   if (scenario().run.integrator == scenario::Integrator::Explicit)
     explicit_.emplace(organ(), world());
-  for (std::uint32_t i = 0; i < world().node_count(); ++i)
-    if (world().node_classes[i] != world::NodeClass::Fixed) free_nodes_.push_back(NodeIndex(i));
   if (scenario().run.starts_in_equilibrium) settle(threads);
 }
 
@@ -200,18 +181,16 @@ bool ScenarioRun::has_implicit_strain() const {
 }
 
 void ScenarioRun::settle(unsigned threads) {
-  auto& world = simulation_.editable_state().world;
   if (dynamics::Relaxation::is_needed(organ())) {
     auto relaxed = resolved_;
     relaxed.organ = relaxed_organ(std::move(relaxed.organ));
     const ScenarioRun run(std::move(relaxed), solver_kind_, threads);
-    world.displacements = run.world().displacements;
+    simulation_.start_relaxed(run.world().displacements);
     settling_ = run.settling();
   } else {
-    settling_ = relax(simulation_.loads().at_rest(world));
+    settling_ = report_of(equilibrium_.relax(simulation_.loads().at_rest(world())));
+    simulation_.start_relaxed(world().displacements);
   }
-  dynamics::start_relaxed(organ(), world, simulation_.state().strain_scheme);
-  simulation_.resume();
 }
 
 double ScenarioRun::time_s() const {
@@ -272,132 +251,31 @@ StepReport ScenarioRun::step_dynamic() {
 
 // It has no tools, so there are no contacts to keep.
 StepReport ScenarioRun::step_explicit() {
-  auto& world = simulation_.editable_state().world;
-  const double begin_s = seconds_of(world.tick++);
   const auto& run = scenario().run;
-  for (std::uint32_t i = 1; i <= run.steps_per_tick; ++i)
-    explicit_->step(run.dt_s(), world, simulation_.loads().at(begin_s + run.dt_s() * i, world));
+  const double begin_s = seconds_of(simulation_.current_tick());
+  simulation_.tick_by([&](world::World& world) {
+    for (std::uint32_t i = 1; i <= run.steps_per_tick; ++i)
+      explicit_->step(run.dt_s(), world, simulation_.loads().at(begin_s + run.dt_s() * i, world));
+  });
   StepReport report;
-  report.active_nodes = free_nodes_.size();
-  for (const auto& u : world.displacements) report.solve.nodes_rejected += is_finite(u) ? 0 : 1;
-  return report;
-}
-
-void ScenarioRun::place_held(const dynamics::ExternalLoads& loads) {
-  auto& world = simulation_.editable_state().world;
-  auto& context = simulation_.editable_context();
-  float largest_move_m = 0;
-  const auto put = [&](NodeIndex node, std::uint8_t axes, const Vec3f& displacement) {
-    Vec3f& u = world.displacements[node.value];
-    const Vec3f from = u;
-    if (axes & 1) u.x = displacement.x;
-    if (axes & 2) u.y = displacement.y;
-    if (axes & 4) u.z = displacement.z;
-    largest_move_m = std::max(largest_move_m, length(u - from));
-  };
-  for (std::size_t i = 0; i < loads.held.size(); ++i)
-    put(loads.held[i], kAllAxes, loads.held_displacements[i]);
-  for (const auto& hold : loads.axis_holds) put(hold.node, hold.axes, hold.displacement);
-  context.solve.solver.read_motion(world);
-  context.contact.finder.surface_moved(largest_move_m);
-}
-
-double ScenarioRun::potential_energy_j(const dynamics::ExternalLoads& loads) const {
-  double energy_j = simulation_.context().solve.solver.tissue().energy_j(world().displacements);
-  for (std::size_t i = 0; i < world().node_count(); ++i) {
-    Vec3d load = organ().gravity_m_s2 * static_cast<double>(world().masses[i]);
-    if (!loads.forces.empty()) load += to_double(loads.forces[i]);
-    energy_j -= dot(load, to_double(world().displacements[i]));
-  }
-  return energy_j;
-}
-
-StepReport ScenarioRun::relax(const dynamics::ExternalLoads& loads) {
-  auto& world = simulation_.editable_state().world;
-  auto& context = simulation_.editable_context();
-  const std::uint32_t most = scenario().run.max_sweeps;
-  dynamics::SolveSettings how{.dt = kStaticStep_s};
-  how.residual_tolerance_n = static_cast<float>(scenario().run.tolerance_n);
-  how.over_relaxation = kStaticOverRelaxation;
-  how.has_safeguard = false;
-  StepReport report;
-  report.active_nodes = free_nodes_.size();
-  std::uint32_t sweeps = 0;
-  float last_residual = INFINITY;
-  place_held(loads);
-  // Contacts that slide have no potential energy, so that nothing can be said about its descent.
-  const bool descends = context.contact.found.points.empty();
-  double last_energy_j = descends ? potential_energy_j(loads) : 0;
-  do {
-    if (descends) before_stretch_.assign(world.displacements.begin(), world.displacements.end());
-    how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
-    report.solve =
-        context.solve.solver.solve(context.contact.found, free_nodes_, how, world, loads);
-    context.contact.finder.surface_moved(report.solve.largest_move_m);
-    std::ranges::fill(world.velocities, Vec3f{});
-    sweeps += report.solve.sweeps;
-    const double energy_j = descends ? potential_energy_j(loads) : 0;
-    if (!(energy_j <= last_energy_j + kEnergySlack * std::abs(last_energy_j))) {
-      std::ranges::copy(before_stretch_, world.displacements.begin());
-      context.solve.solver.read_motion(world);
-      how.over_relaxation *= kOverRelaxationStepBack;
-      continue;
-    }
-    last_energy_j = energy_j;
-    report.is_converged =
-        report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0;
-    if (!(report.solve.residual_n < last_residual) && how.over_relaxation > 1)
-      how.over_relaxation = 1 + (how.over_relaxation - 1) * kOverRelaxationStepDown;
-    last_residual = report.solve.residual_n;
-  } while (!report.is_converged && sweeps < most);
-  report.solve.sweeps = sweeps;
+  report.active_nodes = equilibrium_.free_nodes();
+  for (const auto& u : world().displacements) report.solve.nodes_rejected += is_finite(u) ? 0 : 1;
   return report;
 }
 
 StepReport ScenarioRun::step_static() {
-  auto& state = simulation_.editable_state();
-  auto& context = simulation_.editable_context();
-  auto& world = state.world;
   const double now = scenario().run.load_times_s[steps_done_];
-  const auto loads = simulation_.loads().at(now, world);
-  StepReport report;
-  std::uint32_t sweeps = 0;
-  float change = scenario().tools.empty() ? 0 : INFINITY;
-  if (scenario().tools.empty()) {
-    report = relax(loads);
-    sweeps = report.solve.sweeps;
-  }
-  for (int round = 0; !scenario().tools.empty() && round < kMaxContactRounds &&
-                      (round < kMinContactRounds || change > kContactChange_m);
-       ++round) {
-    sample_tools(++world.tick, now, round == 0);
-    step::admit_inputs(inputs_, world.tick, state.tools, state.claims, state.grasps);
-    state.grasps.follow(state.tools, 0);
-    // Without time a tool has no speed either.
-    context.contact.finder.find({.world = world,
-                                 .tools = state.tools,
-                                 .claims = state.claims,
-                                 .grasps = state.grasps,
-                                 .proxies = state.proxies,
-                                 .tick = world.tick,
-                                 .max_step_m = kNoLimit_m,
-                                 .jump_m = kNoLimit_m},
-                                context.contact.found);
-    before_.assign(world.displacements.begin(), world.displacements.end());
-    report = relax(loads);
-    sweeps += report.solve.sweeps;
-    change = 0;
-    for (std::size_t i = 0; i < before_.size(); ++i)
-      change = std::max(change, length(world.displacements[i] - before_[i]));
-    state.proxies.update(context.contact.found, world, state.tools);
-    context.outbox.claim_events.clear();
-    contact::update_claims(world, state.tools, context.contact.found, context.contact.requests,
-                           state.claims, state.grasps, context.outbox.claim_events);
-  }
-  simulation_.loads().measure(context.solve.solver, context.contact.found);
-  report.is_converged &= change <= kContactChange_m;
-  report.solve.sweeps = sweeps;
-  return report;
+  const auto loads = simulation_.loads().at(now, world());
+  const auto inputs = [&](Tick tick, bool is_first) -> const hands::TickInputs& {
+    sample_tools(tick, now, is_first);
+    return inputs_;
+  };
+  return report_of(scenario().tools.empty() ? equilibrium_.find(loads)
+                                            : equilibrium_.find(loads, inputs));
+}
+
+StepReport ScenarioRun::report_of(const step::EquilibriumReport& found) const {
+  return {found.solve, equilibrium_.free_nodes(), found.is_converged};
 }
 
 StepReport ScenarioRun::step() {

@@ -17,6 +17,7 @@
 
 #include "server/lab/scenario/scenario.h"
 #include "server/papers/nakao/explicit_euler.h"
+#include "server/tissue/step/equilibrium.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::scenario {
@@ -90,12 +91,7 @@ class ScenarioRun {
   StepReport step_dynamic();
   StepReport step_explicit();
   StepReport step_static();
-  // Sweeps until nothing is out of balance by more than the tolerance; everything is at rest then.
-  StepReport relax(const dynamics::ExternalLoads& loads);
-  // Held and displaced nodes go where the loads have them.
-  void place_held(const dynamics::ExternalLoads& loads);
-  // Elastic energy minus the work of loads and gravity, J. O(nodes).
-  double potential_energy_j(const dynamics::ExternalLoads& loads) const;
+  StepReport report_of(const step::EquilibriumReport& found) const;
   void settle(unsigned threads);
 
   const scenario::ResolvedScenario resolved_;
@@ -106,14 +102,12 @@ class ScenarioRun {
   StepReport settling_;
   step::Simulation simulation_;
   const step::TickDecisions decisions_;
+  step::Equilibrium equilibrium_;
   std::vector<std::size_t> watched_;  // per probe: its number among the watched, of reactions
 
   // Steps use these members as workspace.
   hands::TickInputs inputs_;
   std::optional<nakao::ExplicitEuler> explicit_;
-  std::vector<NodeIndex> free_nodes_;  // of a static run
-  std::vector<Vec3f> before_;          // displacements before a round of contacts
-  std::vector<Vec3f> before_stretch_;  // displacements before a stretch of sweeps
 };
 
 }  // namespace trocar::scenario

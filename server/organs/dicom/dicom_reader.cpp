@@ -346,7 +346,7 @@ class SegmentationReader {
     for (std::size_t f = 0; f < places_.size(); ++f) {
       const auto place = static_cast<std::size_t>(grid.slice_of_places[f]);
       if (std::exchange(is_filled[place], std::uint8_t{1}))
-        return reader_.error(fmt::format("frame {}: another frame stands at its place", f + 1));
+        return reader_.error(fmt::format("frame {}: another frame stands at its position", f + 1));
       for (std::size_t i = 0; i < size; ++i) {
         const int label = bits_.value(*stored, f * size + i);
         if (label != 0 && !has_segment(label))
@@ -378,7 +378,7 @@ class SeriesReader {
     const auto grid = arrange_slices(places_, plane_.right, plane_.down, plane_.spacing_mm, false);
     if (!grid) return error(grid.error().message);
     if (grid->count != static_cast<int>(files_.size()))
-      return error(fmt::format("{} slices stand at {} places: it is more than one series",
+      return error(fmt::format("{} slices stand at {} positions: it is more than one series",
                                files_.size(), grid->count));
     auto map = Result<LabelMap>(LabelMap{});
     for (std::size_t i = 0; i < files_.size(); ++i)

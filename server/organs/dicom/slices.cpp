@@ -55,7 +55,7 @@ Result<SliceGrid> arrange_slices(const std::vector<Vec3d>& places, const Vec3d& 
   const double count = extent / step + 1;
   if (count > (kMissing + 1) * static_cast<double>(levels.size()) + kAlwaysMissing)
     return error(
-        fmt::format("its {} slices are spread over {:.0f} places: most of them are missing",
+        fmt::format("its {} slices are spread over {:.0f} positions: most of them are missing",
                     levels.size(), count));
   SliceGrid grid{.origin = places[lowest],
                  .step = up * step,

@@ -152,7 +152,7 @@ Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine&
     return bad(options,
                fmt::format("the vertex at {:.5g} {:.5g} {:.5g} is {:.2f} mm from the surface of "
                            "the mesh, and {} of {} vertices are more than {:.2f} mm, half of its "
-                           "mean edge: is it the same organ, in the same unit and place? A mesh "
+                           "mean edge: is it the same organ, in the same unit and position? A mesh "
                            "that is finer or coarser fits otherwise (--nodes)",
                            in_file(place.x), in_file(place.y), in_file(place.z),
                            1e3 * result.farthest_m, beyond, surface.quanta.size(), 1e3 * most));
@@ -215,7 +215,7 @@ Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& 
   if (result.surface.triangles.empty()) return bad(options, "has no triangles to embed");
   if (result.surface.quanta.size() > wire::kMaxFineVertices)
     return bad(options,
-               fmt::format("has {} vertices that differ in place or texture coordinates, a fine "
+               fmt::format("has {} vertices that differ in position or texture coordinates, a fine "
                            "surface may have {}",
                            result.surface.quanta.size(), wire::kMaxFineVertices));
   if (Status valid = wire::validate(result.surface); !valid.ok())

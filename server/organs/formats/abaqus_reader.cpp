@@ -165,7 +165,7 @@ class AbaqusReader {
       case Section::ElementSet:
         return members(line);
       case Section::Instance:
-        left_out_.push_back("the place of *INSTANCE");
+        left_out_.push_back("the position of *INSTANCE");
         section_ = Section::None;
         return {};
       default:

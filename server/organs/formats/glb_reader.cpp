@@ -103,7 +103,7 @@ class GlbReader {
     parts_.say(surface.left_out);
     if (picture_) {
       surface.picture = std::string(view(*find(element("images", *picture_), "bufferView")));
-      if (lacks_place_) fault_ = "some of its meshes have no place in the picture";
+      if (lacks_place_) fault_ = "some of its meshes have no texture coordinates";
     }
     if (fault_.empty() && !lacks_place_) surface.corner_texture = std::move(texture_);
     surface.texture_fault = std::move(fault_);
@@ -371,11 +371,11 @@ class GlbReader {
         if (!is_finite(p)) fail(name + ": vertex " + std::to_string(v) + " is not finite");
         corners_.push_back(p);
         if (!texture) continue;
-        if (v >= texture->count) fail(name + " has fewer places in a picture than vertices");
+        if (v >= texture->count) fail(name + " has fewer texture coordinates than vertices");
         const double across = texture->share(v, 0), down = texture->share(v, 1);
         if (!std::isfinite(across + down) && fault_.empty())
           fault_ =
-              name + ": the place of vertex " + std::to_string(v) + " in the picture is not finite";
+              name + ": the texture coordinate of vertex " + std::to_string(v) + " is not finite";
         places_in_picture[k] = {across, 1 - down};
       }
     }
@@ -401,7 +401,7 @@ class GlbReader {
     }
     Rows places = rows(*number, "VEC2", 2);
     if (places.component == kUInt32)
-      fail(name + ": places in a picture are whole numbers of 32 bits");
+      fail(name + ": texture coordinates are whole numbers of 32 bits");
     return places;
   }
 

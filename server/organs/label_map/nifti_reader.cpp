@@ -226,7 +226,7 @@ class NiftiReader {
                const std::array<Vec3d, 3>& of_qform, const Vec3d& origin_of_qform) {
     LabelMap other;
     if (!turned || !place(origin_of_qform, of_qform, other)) {
-      map_.warnings.push_back("sform and qform disagree: qform gives no place, sform was taken");
+      map_.warnings.push_back("sform and qform disagree: qform gives no position, sform was taken");
       return;
     }
     double farthest = 0;  // of the corners of the map

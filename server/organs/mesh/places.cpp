@@ -38,7 +38,7 @@ Result<Centring> centre(std::span<Vec3d> positions, Unit unit, const std::string
                                       : "scale it, or give the unit with --unit m, cm or mm");
     return Error{ErrorCode::BadFile, text};
   }
-  if (largest == 0) return Error{ErrorCode::BadFile, "all " + things + " are at the same place"};
+  if (largest == 0) return Error{ErrorCode::BadFile, "all " + things + " are at the same position"};
   Centring done{box.least + size * 0.5, {}};
   for (Vec3d& p : positions) p -= done.offset_m;
   if (length(done.offset_m) <= kFar_m) return done;

@@ -108,7 +108,8 @@ class Builder {
     for (NamedNodes& set : raw_.node_sets)
       for (NodeIndex& node : set.nodes) node = NodeIndex(welding.first[node.value]);
     keep_nodes(welding.keep);
-    warn("welded " + std::to_string(welding.welded) + " nodes to others at exactly the same place");
+    warn("welded " + std::to_string(welding.welded) +
+         " nodes to others at exactly the same position");
     return {};
   }
 

@@ -1,6 +1,5 @@
 #include "server/organs/organ/packed_file.h"
 
-#include <unistd.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <memory>
 
 #include "common/base/checksum.h"
+#include "common/base/unfinished_file.h"
 #include "common/budget/message_budget.h"
 #include "server/organs/organ/bad_file.h"
 
@@ -99,21 +99,7 @@ Result<PackedBody> unpack(const PackedKind& kind, BytesView file) {
 }
 
 Status write_packed(const std::filesystem::path& path, BytesView file) {
-  auto temporary = path;
-  temporary += "." + std::to_string(::getpid()) + ".tmp";
-  std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
-  out.close();
-  std::error_code failure;
-  if (out) std::filesystem::rename(temporary, path, failure);
-  if (out && !failure) return {};
-  std::error_code ignored;
-  std::filesystem::remove(temporary, ignored);
-  return Error{ErrorCode::ResourceMissing,
-               path.string() +
-                   ": cannot be written: check that the folder exists, may be written "
-                   "to and has " +
-                   std::to_string((file.size() >> 20) + 1) + " MiB left"};
+  return write_whole_file(path.string(), {reinterpret_cast<const char*>(file.data()), file.size()});
 }
 
 Result<Bytes> read_packed(const std::filesystem::path& path) {

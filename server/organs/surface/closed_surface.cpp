@@ -128,7 +128,7 @@ class Checker {
       for (NodeIndex& node : triangle) node = NodeIndex(welding.first[node.value]);
     keep_vertices(welding.keep);
     warn("welded " + std::to_string(welding.welded) +
-         " vertices to others at exactly the same place");
+         " vertices to others at exactly the same position");
     return {};
   }
 

@@ -60,7 +60,7 @@ std::string source_of(const organ::Organ& organ, const Training& training,
                       const Settings& settings) {
   char text[120];
   std::snprintf(text, sizeof text,
-                ", %zu snapshots at %zu places, up to %g N on patches of %g mm, seed %llu",
+                ", %zu snapshots at %zu sites, up to %g N on patches of %g mm, seed %llu",
                 training.snapshots.size(), training.places.size(), settings.force_n,
                 1e3 * settings.radius_m, static_cast<unsigned long long>(settings.seed));
   return organ.name + text;

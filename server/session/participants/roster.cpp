@@ -92,12 +92,11 @@ Result<Participant> Roster::join(std::string_view name, Role role,
     if (auto checked = check_shape(shape); !checked)
       return refuse(JoinRefusal::ToolsInvalid, checked.error().message);
   if (const auto* other = find_alike(name))
-    return refuse(
-        JoinRefusal::NameTaken,
-        "name: " + called(name, *other) +
-            (other->is_away ? " has lost the connection, and the place is kept for a while"
-                            : " is here already") +
-            ", choose another with --name");
+    return refuse(JoinRefusal::NameTaken,
+                  "name: " + called(name, *other) +
+                      (other->is_away ? " has lost the connection, and the seat is kept for a while"
+                                      : " is here already") +
+                      ", choose another with --name");
   if (has_tools(role) && tools.empty()) tools.emplace_back();
 
   const bool has_hands = !tools.empty();
@@ -110,10 +109,10 @@ Result<Participant> Roster::join(std::string_view name, Role role,
   if (free == last || alike >= places)
     return refuse(JoinRefusal::Full,
                   "full: all " + std::to_string(places) +
-                      (has_hands                ? " places with tools are taken, join as "
+                      (has_hands                ? " seats with tools are taken, join as "
                                                   "observer or come back"
-                       : role == Role::Observer ? " places for watchers are taken, come back later"
-                                                : " places for instructors are taken, join as "
+                       : role == Role::Observer ? " seats for watchers are taken, come back later"
+                                                : " seats for instructors are taken, join as "
                                                   "observer or come back later"));
   const auto index = static_cast<std::uint8_t>(free - slots_.begin());
   *free = Participant{

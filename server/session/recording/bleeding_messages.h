@@ -6,7 +6,7 @@
 
 #include "common/base/result.h"
 #include "common/journal/session_journal.h"
-#include "server/session/bleeding/rules.h"
+#include "server/tissue/bleeding/rules.h"
 
 namespace trocar::recording {
 

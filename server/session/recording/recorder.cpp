@@ -18,7 +18,6 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
                       frame.regions.size() * sizeof(std::uint16_t);
   bytes += frame.blood.size();
   if (frame.snapshot) bytes += frame.snapshot->size();
-  if (frame.bleeding_snapshot) bytes += frame.bleeding_snapshot->size();
   if (frame.change)
     bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
              frame.change->removed.size() * sizeof(TriangleIndex) +
@@ -278,8 +277,6 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
     message.set_organ_hash(organ_hash_);
     message.set_state_hash(xxh3_64(*frame.snapshot));
     message.set_state(frame.snapshot->data(), frame.snapshot->size());
-    if (frame.bleeding_snapshot)
-      message.set_bleeding(frame.bleeding_snapshot->data(), frame.bleeding_snapshot->size());
     if (auto s = writer_->write_snapshot(not_before_last(frame.snapshot_tick), now, message); !s)
       return s;
   }

@@ -62,11 +62,6 @@ Result<Tick> restore_before(Tick tick, journal::SessionJournal& journal, const s
   const auto restored =
       simulation.restore_snapshot(bytes_of(std::string_view((*snapshot)->state())));
   if (!restored) return cannot(path, restored.error().message);
-  if (session.bleeding) {
-    const auto blood =
-        session.bleeding->restore_state(bytes_of(std::string_view((*snapshot)->bleeding())));
-    if (!blood) return cannot(path, blood.error().message);
-  }
   return simulation.current_tick();
 }
 
@@ -81,8 +76,6 @@ Result<std::uint64_t> simulate_up_to(Tick last, journal::SessionJournal& journal
         hash = record.state_hash;
         if (record.tick <= simulation.current_tick()) return {};
         const auto& done = simulation.tick(record.inputs, record.decisions);
-        if (const auto frame = simulation.pop_frame(); frame && session.bleeding)
-          session.bleeding->observe(*frame, simulation.layout(), simulation.state().tools);
         if (done.state_hash == hash) return {};
         return cannot(path, fmt::format("tick {} has another state than was recorded, see "
                                         "trocar-journal verify",
@@ -146,10 +139,9 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   if (!last) return last.error();
   auto bleeding = recorded_bleeding(journal, path);
   if (!bleeding) return bleeding.error();
-  ResumedSession session{.simulation = step::Simulation(std::move(*organ), options.workers),
-                         .bleeding = {},
+  step::SceneRules rules{.bleeding = std::move(*bleeding)};
+  ResumedSession session{.simulation = step::Simulation(std::move(*organ), options.workers, rules),
                          .continuation = {std::filesystem::path(path).filename().string(), *last}};
-  if (*bleeding) session.bleeding.emplace(std::move(**bleeding));
   const auto from = restore_before(*last, journal, path, session);
   if (!from) return from.error();
   session.snapshot_tick = *from;

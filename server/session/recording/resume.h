@@ -12,7 +12,6 @@
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
 #include "common/lesson/course.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/simulation.h"
 
@@ -26,12 +25,11 @@ struct ResumeOptions {
 
 struct ResumedSession {
   step::Simulation simulation;
-  std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
-  journal::Continuation continuation;          // what a new journal has to say
-  Tick snapshot_tick = 0;                      // simulated again from here on
-  std::uint64_t state_hash = 0;                // of the last tick, as recorded
-  std::optional<lesson::Course> course;        // of a lesson that had begun
-  std::string course_lacks;                    // a line: why it does not know all that came before
+  journal::Continuation continuation;    // what a new journal has to say
+  Tick snapshot_tick = 0;                // simulated again from here on
+  std::uint64_t state_hash = 0;          // of the last tick, as recorded
+  std::optional<lesson::Course> course;  // of a lesson that had begun
+  std::string course_lacks;              // a line: why it does not know all that came before
   // Those who were in the session. A hand is among them if the simulation has its tools, and else
   // it never came.
   std::vector<participants::Participant> participants;

@@ -141,16 +141,14 @@ class Trimmer {
   }
 
   Status write_state(ResumedSession& session) {
-    Bytes state, blood;
+    Bytes state;
     session.simulation.write_snapshot(state);
-    if (session.bleeding) session.bleeding->write_state(blood);
     proto::WorldSnapshot snapshot;
     snapshot.set_tick(cut_.begin);
     snapshot.set_sim_version(kSimVersion);
     snapshot.set_organ_hash(journal_.info().organ_hash);
     snapshot.set_state_hash(xxh3_64(state));
     snapshot.set_state(state.data(), state.size());
-    if (session.bleeding) snapshot.set_bleeding(blood.data(), blood.size());
     return write(JournalTopic::Snapshot, cut_.begin, snapshot);
   }
 

@@ -89,13 +89,12 @@ class Verifier::Collector final : public MessageSink {
 };
 
 Verifier::Verifier(const journal::SessionInfo& info, step::Simulation simulation,
-                   std::optional<bleeding::Rules> bleeding, VerifyReport& report)
+                   VerifyReport& report)
     : info_(info),
       report_(report),
       is_older_(is_older(info.protocol)),
       simulation_(std::move(simulation)),
       messages_(simulation_.organ().name, simulation_.layout()) {
-  if (bleeding) bleeding_.emplace(std::move(*bleeding));
   begin_tick_ = info_.begin_tick();
   begins_with_snapshot_ = info_.begins_with_snapshot();
   next_tick_ = begin_tick_ + 1;
@@ -274,10 +273,7 @@ void Verifier::check_record(const proto::TickRecord& message) {
   continue_snapshots(done.state_hash);
   if (report_.first_difference) return;
   if (snapshots_.contains(tick)) compare_snapshot(tick);
-  if (auto frame = simulation_.pop_frame()) {
-    if (bleeding_) bleeding_->observe(*frame, simulation_.layout(), simulation_.state().tools);
-    begin_frame(*frame);
-  }
+  if (auto frame = simulation_.pop_frame()) begin_frame(*frame);
 }
 
 bool Verifier::start_from_snapshot(Tick tick) {
@@ -292,7 +288,6 @@ bool Verifier::start_from_snapshot(Tick tick) {
             "a state"});
     return false;
   }
-  if (!restore_blood(found->second)) return false;
   report_.last_hash = record_.state_hash;
   is_in_step_ = true;
   has_key_schedule_ = false;
@@ -307,15 +302,6 @@ bool Verifier::start_from_snapshot(Tick tick) {
   return true;
 }
 
-bool Verifier::restore_blood(const proto::WorldSnapshot& snapshot) {
-  if (!bleeding_) return true;
-  const auto bytes = bytes_of(std::string_view(snapshot.bleeding()));
-  const Status restored = bleeding_->restore_state(bytes);
-  if (!restored.ok())
-    differ({snapshot.tick(), kSnapshots, "bleeding", restored.error().message, "a state"});
-  return restored.ok();
-}
-
 void Verifier::begin_from(const proto::WorldSnapshot& snapshot) {
   if (std::exchange(knows_begin_, false)) {
     if (!is_state(snapshot)) return;
@@ -326,7 +312,6 @@ void Verifier::begin_from(const proto::WorldSnapshot& snapshot) {
   if (!restored.ok() || simulation_.current_tick() != snapshot.tick())
     return differ({snapshot.tick(), kSnapshots, "state",
                    restored.ok() ? "of another tick" : restored.error().message, "a state"});
-  if (!restore_blood(snapshot)) return;
   is_in_step_ = true;
   messages_ = FrameMessages(simulation_.organ().name, simulation_.layout());
   if (!first_topology_) return;
@@ -342,23 +327,13 @@ bool Verifier::is_state(const proto::WorldSnapshot& snapshot) {
   Bytes state;
   simulation_.write_snapshot(state);
   const auto [in_recorded, in_state] = std::ranges::mismatch(recorded, state);
-  const bool is_equal = in_recorded == recorded.end() && in_state == state.end();
-  if (!is_equal) {
-    const auto text = [](auto at, auto end) {
-      return at == end ? std::string("nothing") : fmt::format("0x{:02x}", *at);
-    };
-    differ({tick, kSnapshots, fmt::format("byte {} of state", in_state - state.begin()),
-            text(in_recorded, recorded.end()), text(in_state, state.end())});
-    return false;
-  }
-  Bytes blood;
-  if (bleeding_) bleeding_->write_state(blood);
-  const auto recorded_blood = bytes_of(std::string_view(snapshot.bleeding()));
-  const bool is_blood_equal = std::ranges::equal(recorded_blood, blood);
-  if (!is_blood_equal)
-    differ({tick, kSnapshots, "bleeding", fmt::format("{} bytes", recorded_blood.size()),
-            fmt::format("{} others", blood.size())});
-  return is_blood_equal;
+  if (in_recorded == recorded.end() && in_state == state.end()) return true;
+  const auto text = [](auto at, auto end) {
+    return at == end ? std::string("nothing") : fmt::format("0x{:02x}", *at);
+  };
+  differ({tick, kSnapshots, fmt::format("byte {} of state", in_state - state.begin()),
+          text(in_recorded, recorded.end()), text(in_state, state.end())});
+  return false;
 }
 
 // The simulation is at this tick, and so is a snapshot.

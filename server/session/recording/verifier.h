@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "common/journal/session_journal.h"
-#include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/frame_messages.h"
 #include "server/session/recording/stored_surface.h"
 #include "server/session/recording/verify.h"
@@ -20,10 +19,8 @@ namespace trocar::recording {
 
 class Verifier {
  public:
-  // The simulation is at its beginning. `bleeding`: of a session that bleeds. `report` says whether
-  // to simulate, and is filled.
-  Verifier(const journal::SessionInfo& info, step::Simulation simulation,
-           std::optional<bleeding::Rules> bleeding, VerifyReport& report);
+  // The simulation is at its beginning. `report` says whether to simulate, and is filled.
+  Verifier(const journal::SessionInfo& info, step::Simulation simulation, VerifyReport& report);
   ~Verifier();
 
   // Lists of participants of the whole recording, in order, and whether these are all: names and
@@ -68,8 +65,6 @@ class Verifier {
   void check_join(Tick tick);
   void note_missing(Tick before);
   bool start_from_snapshot(Tick tick);
-  // False: the snapshot's blood is none, which is told.
-  bool restore_blood(const proto::WorldSnapshot& snapshot);
   // A journal that does not begin with the organ at rest begins with the state to go on from.
   void begin_from(const proto::WorldSnapshot& snapshot);
   // False: the snapshot is not the state that the simulation is in, which is told.
@@ -86,7 +81,6 @@ class Verifier {
   VerifyReport& report_;
   bool is_older_ = false;  // of an older protocol
   step::Simulation simulation_;
-  std::optional<bleeding::Bleeding> bleeding_;
   FrameMessages messages_;
   participants::Roster roster_;  // names for claim events
   StoredSurface surface_;

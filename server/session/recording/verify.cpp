@@ -88,11 +88,10 @@ Result<VerifyReport> verify_journal(const std::string& path,
   if (!info.is_finished && (!is_changed || whole.damaged_chunks > 0))
     report.reasons.push_back("it has no end: " + report.container);
 
-  std::optional<dynamics::StrainScheme> scheme;
-  if (info.has_implicit_strain) scheme = dynamics::StrainScheme::Implicit;
-  auto simulation =
-      step::Simulation(std::move(*organ), usable_workers(), {}, std::move(*loads), scheme);
-  Verifier verifier(info, std::move(simulation), std::move(*bleeding), report);
+  step::SceneRules rules{.loads = std::move(*loads), .bleeding = std::move(*bleeding)};
+  if (info.has_implicit_strain) rules.strain_scheme = dynamics::StrainScheme::Implicit;
+  step::Simulation simulation(std::move(*organ), usable_workers(), std::move(rules));
+  Verifier verifier(info, std::move(simulation), report);
   const auto lists = (*journal)->read_participants(0, std::numeric_limits<Tick>::max(),
                                                    [&](Tick tick, const proto::Participants& list) {
                                                      verifier.add_list(tick, list);

@@ -65,12 +65,14 @@ Replicator::Replicator(net::Connections& connections, participants::SimulationIn
       organ_name_(std::move(organ_name)),
       layout_(std::move(layout)),
       roster_(options_.places),
-      absences_(options_.return_seconds) {
-  if (options_.course)
-    course_.emplace(std::move(*options_.course));
-  else if (options_.lesson)
-    course_.emplace(*options_.lesson);
-}
+      absences_(options_.return_seconds),
+      room_{options_, *this, roster_, inbox_},
+      hands_(room_, counters_),
+      marks_(room_),
+      pace_(room_, hands_.held()),
+      drawing_(room_),
+      course_(room_),
+      teaching_(room_, door_, hands_, pace_, drawing_) {}
 
 Replicator::~Replicator() = default;
 
@@ -142,10 +144,10 @@ void Replicator::leave(Client& client) {
     const auto slot = client.participant->slot;
     roster_.leave(slot);
     absences_.forget(slot);
-    held_tools_.forget(slot);
+    hands_.held().forget(slot);
     if (slot.has_tools()) inbox_.push_leave(slot);
-    if (wire::rights_of(client.participant->role).may_teach) release_unless_led();
-    participants_changed_ = true;
+    if (wire::rights_of(client.participant->role).may_teach) teaching_.release_unless_led();
+    room_.has_changed = true;
   }
 }
 
@@ -157,20 +159,20 @@ void Replicator::forget(Client& client) {
 void Replicator::settle_participants() {
   const auto now = options_.clock_ns();
   do {  // somebody may drop out while being told
-    if (participants_changed_) {
-      participants_changed_ = false;
-      are_participants_told_ = false;
+    if (room_.has_changed) {
+      room_.has_changed = false;
+      room_.is_told = false;
       if (options_.on_participants) options_.on_participants(roster_.list(), newest_tick());
     }
     tell_participants(now);
-  } while (participants_changed_);
+  } while (room_.has_changed);
 }
 
 void Replicator::tell_participants(std::uint64_t now_ns) {
   const bool is_early =
       participants_told_ns_ && now_ns - *participants_told_ns_ < options_.participants_interval_ns;
-  if (are_participants_told_ || is_early) return;
-  are_participants_told_ = true;
+  if (room_.is_told || is_early) return;
+  room_.is_told = true;
   participants_told_ns_ = now_ns;
   broadcast(encode_participants(roster_.list(), door_.is_closed(), door_.waiting()));
 }
@@ -178,12 +180,12 @@ void Replicator::tell_participants(std::uint64_t now_ns) {
 void Replicator::end_all(EndReason reason, const std::string& text) {
   while (!clients_.empty()) end_session(*clients_.begin()->second, {reason, text});
   end_absences(std::numeric_limits<std::uint64_t>::max());
-  participants_changed_ = false;
+  room_.has_changed = false;
 }
 
 // ---- what they say ----
 
-std::optional<Replicator::Ending> Replicator::check_rate(Client& client, std::size_t bytes) {
+std::optional<Ending> Replicator::check_rate(Client& client, std::size_t bytes) {
   const auto now = options_.clock_ns();
   const auto flood = [this](std::uint32_t limit, const char* what) {
     ++counters_.floods;
@@ -197,7 +199,7 @@ std::optional<Replicator::Ending> Replicator::check_rate(Client& client, std::si
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::handle_message(Client& client, BytesView bytes) {
+std::optional<Ending> Replicator::handle_message(Client& client, BytesView bytes) {
   const auto protocol_error = [](std::string text) {
     return Ending{EndReason::ProtocolError, std::move(text)};
   };
@@ -215,27 +217,27 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
     case proto::Envelope::kHello:
       return admit(client, envelope.hello());
     case proto::Envelope::kToolSample:
-      return handle_sample(client, envelope.tool_sample(), !client.has_sent_datagrams);
+      return hands_.sample(client, envelope.tool_sample(), !client.has_sent_datagrams);
     case proto::Envelope::kToolChange:
-      return handle_tool_change(client, envelope.tool_change());
+      return hands_.change_tool(client, envelope.tool_change());
     case proto::Envelope::kHandReport:
-      return handle_hand_report(client, envelope.hand_report());
+      return hands_.report(client, envelope.hand_report());
     case proto::Envelope::kFrameAck:
       if (client.carrier == 0) return handle_ack(client, envelope.frame_ack());
       note_answer(client.participant->slot, envelope.frame_ack());
       return std::nullopt;
     case proto::Envelope::kMarkRequest:
-      return handle_mark(client, envelope.mark_request());
+      return marks_.ask(client, envelope.mark_request(), pace_.is_paused());
     case proto::Envelope::kPointRequest:
-      return handle_point(client, envelope.point_request());
+      return drawing_.point(client, envelope.point_request());
     case proto::Envelope::kStrokeRequest:
-      return handle_stroke(client, envelope.stroke_request());
+      return drawing_.stroke(client, envelope.stroke_request(), layout_);
     case proto::Envelope::kViewRequest:
-      return handle_view(client, envelope.view_request());
+      return drawing_.view(client, envelope.view_request());
     case proto::Envelope::kLessonRequest:
-      return handle_lesson(client, envelope.lesson_request());
+      return course_.ask(client, envelope.lesson_request(), layout_);
     case proto::Envelope::kTeachRequest:
-      return handle_teach(client, envelope.teach_request());
+      return teaching_.order(client, envelope.teach_request());
     case proto::Envelope::kKeyframeRequest:
       if (client.carrier != 0) return std::nullopt;  // the carrier asks for those that it needs
       client.feed.want_keyframe();
@@ -279,8 +281,8 @@ void Replicator::on_datagram(net::ConnectionId id, BytesView message) {
   settle_participants();
 }
 
-std::optional<Replicator::Ending> Replicator::handle_datagram(
-    Client& client, const proto::ClientDatagram& datagram) {
+std::optional<Ending> Replicator::handle_datagram(Client& client,
+                                                  const proto::ClientDatagram& datagram) {
   client.has_sent_datagrams = true;
   client.feed.hear(datagram.datagrams_received());
   if (datagram.sample_size() > kMostSamplesPerDatagram)
@@ -288,12 +290,12 @@ std::optional<Replicator::Ending> Replicator::handle_datagram(
                   "ClientDatagram.sample: " + std::to_string(datagram.sample_size()) +
                       " samples, at most " + std::to_string(kMostSamplesPerDatagram)};
   for (const auto& sample : datagram.sample())
-    if (auto ending = handle_sample(client, sample, false)) return ending;
+    if (auto ending = hands_.sample(client, sample, false)) return ending;
   if (!datagram.has_ack()) return std::nullopt;
   return handle_ack(client, datagram.ack());
 }
 
-std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto::Hello& hello) {
+std::optional<Ending> Replicator::admit(Client& client, const proto::Hello& hello) {
   if (client.participant) return Ending{EndReason::ProtocolError, "Hello: once is enough"};
   if (barrier_) return Ending{EndReason::ServerClosing, "the session is ending"};
   auto reason = EndReason::ProtocolError;
@@ -313,7 +315,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   }
   if (participants::is_valid_name(request->name))
     if (const auto wait = door_.check(client.applicant)) {
-      are_participants_told_ = false;  // it is seen who waits
+      room_.is_told = false;  // it is seen who waits
       return Ending{EndReason::Closed, *wait};
     }
   if (auto ending = find_place(client, *request)) return ending;
@@ -328,7 +330,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   return welcome(client);
 }
 
-std::optional<Replicator::Ending> Replicator::find_place(Client& client, HelloRequest& request) {
+std::optional<Ending> Replicator::find_place(Client& client, HelloRequest& request) {
   // Who got hold of one code does not take all places with it. A carrier's guests share its
   // address.
   const auto is_alike = [&](const Client& other) {
@@ -363,7 +365,7 @@ std::optional<Replicator::Ending> Replicator::find_place(Client& client, HelloRe
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
+std::optional<Ending> Replicator::welcome(Client& client) {
   const auto slot = client.participant->slot;
   client.is_welcome = true;
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
@@ -375,21 +377,21 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
     for (const auto& law : options_.haptic_laws)
       if (!send(client, encode_haptic_law(law))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
-  participants_changed_ = true;
+  room_.has_changed = true;
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::show_all(Client& client) {
+std::optional<Ending> Replicator::show_all(Client& client) {
   const bool is_shown =
       send(client, encode_participants(roster_.list(), door_.is_closed(), door_.waiting())) &&
       send(client, topology()) && (!encoder_.current() || give_frame(client, true)) &&
-      send(client, encode_recording(recording_)) && show_lesson(client);
+      send(client, encode_recording(recording_)) && pace_.show(client) && marks_.show(client) &&
+      drawing_.show_lines(client) && course_.show(client) && drawing_.show_view(client);
   if (is_shown) return std::nullopt;
   return Ending{EndReason::TooSlow, "the outbox is too small for the first messages"};
 }
 
-std::optional<Replicator::Ending> Replicator::handle_ack(Client& client,
-                                                         const proto::FrameAck& ack) {
+std::optional<Ending> Replicator::handle_ack(Client& client, const proto::FrameAck& ack) {
   const Frame frame = ack.frame();
   if (!client.feed.was_given(frame))
     return Ending{EndReason::ProtocolError,
@@ -450,8 +452,8 @@ void Replicator::replace_surface(const wire::SurfaceLayout& layout, Frame frame)
   for (const auto& [id, client] : clients_) client->feed.forget_before(frame);
 }
 
-bool Replicator::send(Client& client, const wire::SharedBytes& bytes) {
-  if (!connections_.send(client.id, bytes)) return false;
+bool Replicator::send(const Speaker& to, const wire::SharedBytes& bytes) {
+  if (!connections_.send(to.id, bytes)) return false;
   counters_.bytes_queued += bytes->size();
   return true;
 }
@@ -464,6 +466,33 @@ void Replicator::broadcast(const wire::SharedBytes& bytes) {
       end_session(client,
                   {EndReason::TooSlow,
                    "your connection is too slow: messages that cannot be skipped piled up"});
+  }
+}
+
+void Replicator::offer(const wire::SharedBytes& bytes, const Speaker* but) {
+  for (const auto& [id, client] : clients_)
+    if (client->listens() && client.get() != but) send(*client, bytes);
+}
+
+Speaker* Replicator::find(ParticipantSlot slot) const {
+  return client_of(slot);
+}
+
+Replicator::Client* Replicator::client_of(ParticipantSlot slot) const {
+  if (const auto away = away_.find(slot); away != away_.end()) return away->second.get();
+  for (const auto& [id, client] : clients_)
+    if (client->participant && client->participant->slot == slot) return client.get();
+  return nullptr;
+}
+
+void Replicator::put_out(ParticipantSlot slot, const std::string& words) {
+  auto* client = client_of(slot);
+  if (client == nullptr) return;  // it was too slow for what was said of it
+  if (away_.contains(slot)) {
+    leave(*client);
+    away_.erase(slot);
+  } else {
+    end_session(*client, {EndReason::PutOut, words});
   }
 }
 
@@ -485,11 +514,11 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   put_out_revoked();
   Status followed;
   for (const auto& frame : frames) {
-    for (const auto& event : frame->mark_events) note_mark(event);
+    for (const auto& event : frame->mark_events) marks_.note(event);
     if (frame->new_layout) replace_surface(*frame->new_layout, frame->frame);
     for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
     if (frame->change && followed.ok()) followed = change_surface(*frame->change);
-    if (course_ && followed.ok()) observe_lesson(*frame);
+    if (followed.ok()) course_.observe(*frame, layout_);
   }
   const auto& newest = *frames.back();
   if (newest.epoch != layout_.epoch || newest.surface.size() != layout_.vertex_count()) {

@@ -22,12 +22,8 @@
 // claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
 // does not fit, the session ends as too slow.
 //
-// Teaching: instructors hold tools still, open their jaws and hand them over (held_tools.h), put
-// people out and let them in (door.h), rename them, and end the session. Everybody is told of it,
-// and the recording.
-//
-// Lesson: a course (common/lesson) looks at every frame from when somebody with a tool is there.
-// What it finds is told to all and recorded, with the answers and orders that people gave.
+// What people say goes to the part that it is for: hands.h, teaching.h, marks.h, drawing.h,
+// lesson_course.h. They speak to people through Audience, which this is.
 //
 // Guests of a carrier (server/session/guests) are let in as anybody is; what is for everybody goes
 // to the carrier once instead of to each of them.
@@ -49,35 +45,19 @@
 #include "common/lesson/course.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
-#include "server/session/access/door.h"
-#include "server/session/net/connections.h"
 #include "server/session/participants/absences.h"
-#include "server/session/participants/held_tools.h"
-#include "server/session/participants/inbox.h"
-#include "server/session/participants/roster.h"
-#include "server/session/replication/drawing_board.h"
 #include "server/session/replication/frame_encoder.h"
-#include "server/session/replication/replicator_options.h"
+#include "server/session/replication/lesson_course.h"
+#include "server/session/replication/marks.h"
+#include "server/session/replication/teaching.h"
 #include "server/tissue/step/published_frame.h"
 
 namespace trocar::proto {
 class Envelope;
 class ClientDatagram;
-class Drawing;
 class FrameAck;
-class HandReport;
 class Hello;
-class LessonRecord;
-class LessonRequest;
-class MarkRequest;
-class PointRequest;
 class RelayReport;
-class StrokeRequest;
-class TeachEvent;
-class TeachRequest;
-class ToolChange;
-class ToolSample;
-class ViewRequest;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
@@ -92,7 +72,7 @@ struct BarrierResult {
   bool is_equal = false;
 };
 
-class Replicator final : public net::ConnectionHandler {
+class Replicator final : public net::ConnectionHandler, private Audience {
  public:
   Replicator(net::Connections& connections, participants::SimulationInbox& inbox,
              wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
@@ -140,10 +120,6 @@ class Replicator final : public net::ConnectionHandler {
 
  private:
   struct Client;
-  struct Ending {
-    EndReason reason;
-    std::string text;
-  };
 
   // These return what to end the client's session with, or nothing.
   std::optional<Ending> handle_message(Client& client, BytesView bytes);
@@ -169,48 +145,8 @@ class Replicator final : public net::ConnectionHandler {
   // Ends the sessions of those whose code was revoked so that they have to go.
   void put_out_revoked();
   void refuse(Client& client, const std::string& reason);
-  // `is_ordered`: it came by the stream alone, so that sequence numbers must grow.
-  std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample,
-                                      bool is_ordered);
   std::optional<Ending> handle_datagram(Client& client, const proto::ClientDatagram& datagram);
-  std::optional<Ending> handle_hand_report(Client& client, const proto::HandReport& report);
-  std::optional<Ending> handle_mark(Client& client, const proto::MarkRequest& request);
-  // Tells everybody, and the recording, what became of a mark.
-  void note_mark(const step::MarkEvent& event);
-  wire::SharedBytes mark_list() const;
-  wire::SharedBytes pace_message() const;
-  // Holds all tools, or lets them go on unless an instructor holds them; tells everybody.
-  void set_pace(const std::string& by);
-  std::optional<Ending> handle_tool_change(Client& client, const proto::ToolChange& change);
-  std::optional<Ending> handle_point(Client& client, const proto::PointRequest& request);
-  std::optional<Ending> handle_stroke(Client& client, const proto::StrokeRequest& request);
-  std::optional<Ending> handle_view(Client& client, const proto::ViewRequest& request);
-  std::optional<Ending> handle_teach(Client& client, const proto::TeachRequest& request);
-  std::optional<Ending> handle_lesson(Client& client, const proto::LessonRequest& request);
-  // The lesson's own part of a frame, once somebody with a tool is there.
-  void observe_lesson(const step::PublishedFrame& frame);
-  void tell_stage();
-  void tell_line(const std::string& words, bool is_good = true);
-  std::string carry_out(const TeachOrder& order, Client& client, const std::string& words);
-  // Returns the receiver's tool for which the instrument is changed; an error, in words for who
-  // asked: there is none, or nothing to give.
-  Result<ToolSlot> find_receiving_tool(const TeachOrder& order) const;
-  std::string hand_over(const hands::Handover& handover);
-  // Everybody is told whether the tool moves beside its hand's place.
-  void note_loan(ToolSlot tool);
-  // Whoever has that place, away or not; null: nobody.
   Client* client_of(ParticipantSlot slot) const;
-  void put_out(ParticipantSlot slot, const std::string& words);
-  // After somebody has left: without any instructor no tool stays frozen.
-  void release_unless_led();
-  void describe_teaching(const TeachOrder& order, ParticipantSlot by, bool is_done,
-                         const std::string& text, proto::TeachEvent& message) const;
-  void describe_drawing(proto::Drawing& message) const;
-  void wipe_drawing();
-  void record_drawing();
-  void record_lesson(const proto::LessonRecord& record);
-  // Gives a newcomer what is drawn, and the view to follow; false: it does not fit.
-  bool show_lesson(Client& client);
   std::optional<Ending> handle_ack(Client& client, const proto::FrameAck& ack);
   void tell_followed();
   // Ends the session of who sends too much.
@@ -221,11 +157,16 @@ class Replicator final : public net::ConnectionHandler {
   // Another one, to which no change leads: everybody gets it and a keyframe. No frame before
   // `frame` helps any more.
   void replace_surface(const wire::SurfaceLayout& layout, Frame frame);
-  Tick newest_tick() const { return encoder_.current() ? encoder_.current()->tick : 0; }
   // Makes the message of the surface as it is now.
   const wire::SharedBytes& topology();
-  bool send(Client& client, const wire::SharedBytes& bytes);
-  void broadcast(const wire::SharedBytes& bytes);
+
+  bool send(const Speaker& to, const wire::SharedBytes& bytes) override;
+  void broadcast(const wire::SharedBytes& bytes) override;
+  void offer(const wire::SharedBytes& bytes, const Speaker* but) override;
+  Speaker* find(ParticipantSlot slot) const override;
+  void put_out(ParticipantSlot slot, const std::string& words) override;
+  const step::SharedFrame& newest_frame() const override { return encoder_.current(); }
+
   // True if the client has the newest frame afterwards, or it is on its way. `is_required`: do not
   // skip.
   bool give_frame(Client& client, bool is_required);
@@ -252,30 +193,22 @@ class Replicator final : public net::ConnectionHandler {
   participants::Absences absences_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   std::map<ParticipantSlot, std::unique_ptr<Client>> away_;  // without a connection
-  bool participants_changed_ = false;                        // since on_participants was called
-  bool are_participants_told_ = true;
   std::optional<std::uint64_t> participants_told_ns_;
   wire::RecordingState recording_{
       .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
   std::uint64_t recording_told_ns_ = 0;
-  std::optional<std::uint64_t> last_mark_ns_;
-  std::array<std::string, hands::kMostMarks> mark_names_;  // that of the first is empty
-  std::array<bool, hands::kMostMarks> is_marked_{};
-  bool is_mark_pending_ = false;  // the simulation has not said yet what became of it
-  float rate_ = 1;                // of time, before it was paused
-  bool is_paused_ = false;
-  std::string paced_by_;
-  participants::HeldTools held_tools_;
+  ReplicatorCounters counters_;
   access::Door door_;
-  DrawingBoard board_;
-  std::optional<lesson::Course> course_;  // of the lesson that the session gives, if it does
-  bool has_course_begun_ = false, is_hint_told_ = false;
-  std::vector<lesson::Tip> tips_;
-  wire::SharedBytes last_view_;  // null: none since the view was given to somebody
+  Room room_;
+  Hands hands_;
+  Marks marks_;
+  Pace pace_;
+  Drawing drawing_;
+  LessonCourse course_;
+  Teaching teaching_;
   FrameEncoder encoder_;
   step::SharedFrame barrier_;
   std::vector<BarrierResult> barrier_results_;
-  ReplicatorCounters counters_;
 };
 
 }  // namespace trocar::replication

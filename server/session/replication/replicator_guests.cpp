@@ -8,8 +8,7 @@
 
 namespace trocar::replication {
 
-std::optional<Replicator::Ending> Replicator::check_guest(Client& guest,
-                                                          const proto::Envelope& message) {
+std::optional<Ending> Replicator::check_guest(Client& guest, const proto::Envelope& message) {
   const auto found = clients_.find(guest.carrier);
   if (found == clients_.end())
     return Ending{EndReason::ServerClosing, "the connection that carried you is closing"};
@@ -29,7 +28,7 @@ std::optional<Replicator::Ending> Replicator::check_guest(Client& guest,
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::welcome_guest(Client& guest) {
+std::optional<Ending> Replicator::welcome_guest(Client& guest) {
   auto& carrier = *clients_.at(guest.carrier);
   if (carrier.is_carrier) return std::nullopt;
   carrier.is_carrier = true;
@@ -37,8 +36,8 @@ std::optional<Replicator::Ending> Replicator::welcome_guest(Client& guest) {
   return show_all(carrier);
 }
 
-std::optional<Replicator::Ending> Replicator::handle_relay_report(
-    Client& client, const proto::RelayReport& report) {
+std::optional<Ending> Replicator::handle_relay_report(Client& client,
+                                                      const proto::RelayReport& report) {
   if (client.participant->role != participants::Role::Observer)
     return Ending{EndReason::Role, std::string("RelayReport: an observer may relay, and no ") +
                                        participants::name_of(client.participant->role)};
@@ -49,12 +48,11 @@ std::optional<Replicator::Ending> Replicator::handle_relay_report(
   if (!client.reports.take(1, options_.clock_ns()))
     return Ending{EndReason::ProtocolError, "RelayReport: more than one in a second"};
   roster_.set_relayed(client.participant->slot, report.watchers());
-  are_participants_told_ = false;  // the recording does not need it
+  room_.is_told = false;  // the recording does not need it
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::handle_carrier(Client& carrier,
-                                                             const proto::Envelope& message) {
+std::optional<Ending> Replicator::handle_carrier(Client& carrier, const proto::Envelope& message) {
   switch (message.message_case()) {
     case proto::Envelope::kFrameAck:
       return handle_ack(carrier, message.frame_ack());

@@ -12,12 +12,12 @@ bool Replicator::keep_place(Client& client) {
   const auto& participant = *client.participant;
   const auto slot = participant.slot;
   if (!absences_.begin(slot, options_.clock_ns())) return false;
-  log::info("{} ({}) has lost the connection, the place is kept for {} s", participant.name,
+  log::info("{} ({}) has lost the connection, the seat is kept for {} s", participant.name,
             participants::name_of(participant.role), absences_.kept_seconds());
   ++counters_.lost;
   if (options_.gate) options_.gate->note_action(client.applicant, "lost");
   roster_.set_away(slot, true);
-  participants_changed_ = true;
+  room_.has_changed = true;
   away_[slot] = std::move(clients_.extract(client.id).mapped());
   return true;
 }
@@ -35,7 +35,7 @@ bool Replicator::restore(participants::Participant who, const participants::Retu
   if (slot.has_tools()) inbox_.note_hand();
   roster_.restore(std::move(who));
   away_[slot] = std::move(client);
-  participants_changed_ = true;
+  room_.has_changed = true;
   return true;
 }
 
@@ -85,8 +85,8 @@ const participants::Participant* Replicator::find_own_place(const HelloRequest& 
   return own;
 }
 
-std::optional<Replicator::Ending> Replicator::come_back(Client& client,
-                                                        const participants::Participant& place) {
+std::optional<Ending> Replicator::come_back(Client& client,
+                                            const participants::Participant& place) {
   const auto slot = place.slot;
   // The old connection may hang without that anybody has noticed.
   const auto old = std::ranges::find_if(clients_, [&](const auto& entry) {

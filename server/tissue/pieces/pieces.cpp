@@ -111,8 +111,7 @@ void Pieces::wake(world::World& world) {
   for (std::size_t place = 0; place < manners_.size(); ++place) wake(place, world);
 }
 
-bool Pieces::wake_touched(const contact::ContactList& contacts, world::World& world) {
-  const auto before = changed_.size();
+void Pieces::wake_touched(const contact::ContactList& contacts, world::World& world) {
   const auto wake_at = [&](const contact::ContactPoint& point) {
     for (std::size_t k = 0; k < point.node_count; ++k)
       if (manners_[place_at(point.nodes[k])] != Manner::Awake)
@@ -126,7 +125,6 @@ bool Pieces::wake_touched(const contact::ContactList& contacts, world::World& wo
     });
     if (moves) wake_at(point);
   }
-  return changed_.size() > before;
 }
 
 void Pieces::begin_step(const world::World& world) {

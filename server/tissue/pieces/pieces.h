@@ -54,8 +54,8 @@ class Pieces {
   // The world has the edit's nodes. What has changed wakes.
   void update(const topology::Edit& edit, world::World& world);
 
-  // Wakes what is touched in this tick; true: something woke.
-  bool wake_touched(const contact::ContactList& contacts, world::World& world);
+  // Wakes what is touched in this tick.
+  void wake_touched(const contact::ContactList& contacts, world::World& world);
   // Wakes everything.
   void wake(world::World& world);
   bool is_all_asleep() const { return is_all_asleep_; }

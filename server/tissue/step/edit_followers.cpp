@@ -1,5 +1,7 @@
 #include "server/tissue/step/edit_followers.h"
 
+#include "server/tissue/step/rest.h"
+
 namespace trocar::step {
 
 void hand_out(const topology::Edit& edit, State& state) {
@@ -24,17 +26,12 @@ void hand_out(const topology::Edit& edit, const world::World& world, ContactWork
   solve.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
-void hand_out_pieces(const world::World& world, SolveWork& solve) {
-  solve.solver.read_state(world, solve.pieces.changed());
-  solve.pieces.clear_changes();
-}
-
-void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
-              SolveWork& solve) {
+void hand_out(const topology::Edit& edit, State& state, pieces::Pieces& pieces,
+              ContactWork& contact, NearWork& near, SolveWork& solve) {
   hand_out(edit, state);
-  solve.pieces.update(edit, state.world);
+  pieces.update(edit, state.world);
   hand_out(edit, state.world, contact, near, solve);
-  hand_out_pieces(state.world, solve);
+  hand_out_changes(state.world, pieces, solve.solver);
   solve.solver.refresh_relaxed_forces(state.world);
 }
 

@@ -15,11 +15,8 @@ void hand_out(const topology::Edit& edit, State& state);
 void hand_out(const topology::Edit& edit, const world::World& world, ContactWork& contact,
               NearWork& near, SolveWork& solve);
 
-// Tells solver and contacts what pieces have moved, woken or laid to rest.
-void hand_out_pieces(const world::World& world, SolveWork& solve);
-
 // Hands an edit of this tick to both.
-void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
-              SolveWork& solve);
+void hand_out(const topology::Edit& edit, State& state, pieces::Pieces& pieces,
+              ContactWork& contact, NearWork& near, SolveWork& solve);
 
 }  // namespace trocar::step

@@ -76,8 +76,6 @@ struct PublishedFrame {
   // between publications: publishing changes the quantisation's hysteresis after the tick's hash.
   std::shared_ptr<const Bytes> snapshot;
   Tick snapshot_tick = 0;
-  // With a snapshot of a session that bleeds: its blood, as of the last frame before.
-  std::shared_ptr<const Bytes> bleeding_snapshot;
   wire::FrameFigures figures;  // of the frame's tick
 };
 

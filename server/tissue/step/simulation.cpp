@@ -14,13 +14,14 @@
 namespace trocar::step {
 
 State::State(const Scene& scene)
-    : cuts(scene.organ, scene.cutting),
+    : cuts(scene.organ, scene.rules.cutting),
       world(scene.organ),
       claims(scene.organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
       strain_scheme(scene.strain_scheme) {
   dynamics::start_relaxed(scene.organ, world, strain_scheme);
-  for (const auto& load : scene.loads.displaced)
+  if (scene.rules.bleeding) blood.emplace();
+  for (const auto& load : scene.rules.loads.displaced)
     if (load.axes == kAllAxes)
       for (const auto node : load.nodes) world.node_classes[node.value] = world::NodeClass::Fixed;
 }
@@ -61,21 +62,20 @@ void State::visit_without_marks(world::StateArchive& archive) {
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
   archive.fixed_array(quantised);
+  if (blood) blood->visit_state(archive);
   self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
 
 namespace {
 
-std::shared_ptr<const Scene> scene_of(organ::Organ organ, const cutting::Settings& cutting,
-                                      LoadRules loads,
-                                      std::optional<dynamics::StrainScheme> strain_scheme) {
+std::shared_ptr<const Scene> scene_of(organ::Organ organ, SceneRules rules) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
-  scene->cutting = cutting;
-  scene->loads = std::move(loads);
+  scene->rules = std::move(rules);
   scene->strain_scheme =
-      strain_scheme ? *strain_scheme
-                    : dynamics::scheme_for(scene->organ, world::World(scene->organ), kTickSeconds);
+      scene->rules.strain_scheme
+          ? *scene->rules.strain_scheme
+          : dynamics::scheme_for(scene->organ, world::World(scene->organ), kTickSeconds);
   return scene;
 }
 
@@ -94,8 +94,7 @@ SolveWork::SolveWork(const Scene& scene, unsigned workers, const world::World& u
     : solver(scene.organ, uncut, workers, scene.strain_scheme),
       far_plan(solver.far_plan(kTickSeconds)),
       has_linear_far_field(is_costly(scene.organ)),
-      has_tension(organ::any_material(scene.organ, is_under_tension)),
-      pieces(scene.organ) {
+      has_tension(organ::any_material(scene.organ, is_under_tension)) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
 }
 
@@ -114,8 +113,10 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
            .active = propagation::ActiveSet(state.world.node_count()),
            .seeds = {}},
       solve(s, workers, uncut),
+      pieces(s.organ),
       touches(s.organ),
       surface_displacements(state.cuts.layout().vertex_count()) {
+  if (s.rules.bleeding) bleed.emplace(*s.rules.bleeding);
   contact.found.reserve();
   contact.requests.reserve(kMaxTools);
   near.seeds.reserve(2 * kMaxTools);
@@ -133,7 +134,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   if (!state.cuts.history().empty())
     hand_out({state.cuts.topology(), {}, {}}, state.world, contact, near, solve);
   solve.solver.read_state(state.world);
-  solve.pieces.read_state(state.cuts.topology(), state.world);
+  pieces.read_state(state.cuts.topology(), state.world);
 }
 
 namespace {
@@ -193,16 +194,15 @@ Status validate(const TickDecisions& d) {
   return validate_policy(d);
 }
 
-Simulation::Simulation(organ::Organ organ, unsigned workers, const cutting::Settings& cutting,
-                       LoadRules loads, std::optional<dynamics::StrainScheme> strain_scheme)
-    : Simulation(scene_of(std::move(organ), cutting, std::move(loads), strain_scheme), workers) {}
+Simulation::Simulation(organ::Organ organ, unsigned workers, SceneRules rules)
+    : Simulation(scene_of(std::move(organ), std::move(rules)), workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),
       workers_(workers),
       state_(std::make_unique<State>(*scene_)),
       context_(std::make_unique<StepContext>(*scene_, workers_, *state_)),
-      loads_(std::make_unique<ExternalLoads>(scene_->loads, scene_->organ.fixed_nodes,
+      loads_(std::make_unique<ExternalLoads>(scene_->rules.loads, scene_->organ.fixed_nodes,
                                              scene_->organ.mesh.node_count())) {}
 
 Simulation Simulation::beside() const {
@@ -220,7 +220,8 @@ TickDecisions Simulation::with_sweeps_for_organ(TickDecisions decisions) const {
 const TickReport& Simulation::tick(const hands::TickInputs& inputs,
                                    const TickDecisions& decisions) {
   if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark, inputs.mark_number);
-  run_tick(inputs, decisions, scene_->loads.empty() ? nullptr : loads_.get(), *state_, *context_);
+  run_tick(inputs, decisions, scene_->rules.loads.empty() ? nullptr : loads_.get(), *state_,
+           *context_);
   return context_->report;
 }
 
@@ -245,6 +246,22 @@ void Simulation::use_mark(hands::MarkAction action, std::uint8_t number) {
 
 std::unique_ptr<StepContext> Simulation::context_of(State& state) const {
   return std::make_unique<StepContext>(*scene_, workers_, state);
+}
+
+void Simulation::start_relaxed(std::span<const Vec3f> displacements,
+                               std::span<const Vec3f> velocities) {
+  auto& world = state_->world;
+  TROCAR_ASSERT(displacements.size() == world.node_count());
+  std::ranges::copy(displacements, world.displacements.begin());
+  std::ranges::fill(world.velocities, Vec3f{});
+  std::ranges::copy(velocities, world.velocities.begin());
+  dynamics::start_relaxed(scene_->organ, world, state_->strain_scheme);
+  context_ = context_of(*state_);
+}
+
+void Simulation::tick_by(const std::function<void(world::World&)>& move) {
+  ++state_->world.tick;
+  move(state_->world);
 }
 
 void Simulation::write_snapshot(Bytes& out) const {

@@ -4,8 +4,10 @@
 // snapshots both ways. Used by the server, by scenarios, by re-simulation of journals, and by
 // tests. One thread at a time.
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "server/tissue/step/tick.h"
 
@@ -17,16 +19,9 @@ Status validate(const TickDecisions& decisions);
 class Simulation {
  public:
   // workers: threads that may share the solver's work; results do not depend on it.
-  // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
-  // self-contact, and its states cannot be restored.
-  // loads: what acts besides tools, of a scenario that validate() accepts.
-  // strain_scheme: of averaged strain; empty: what dynamics::scheme_for() says for ticks of a
-  // session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
-  explicit Simulation(organ::Organ organ, unsigned workers = 1,
-                      const cutting::Settings& cutting = {}, LoadRules loads = {},
-                      std::optional<dynamics::StrainScheme> strain_scheme = {});
+  explicit Simulation(organ::Organ organ, unsigned workers = 1, SceneRules rules = {});
 
-  // Another one of the same organ and loads, at the beginning. Shares with this one what never
+  // Another one of the same organ and rules, at the beginning. Shares with this one what never
   // changes, so that they may be used by two threads.
   Simulation beside() const;
 
@@ -56,20 +51,22 @@ class Simulation {
   Tick current_tick() const { return state_->world.tick; }
   const wire::SurfaceLayout& layout() const { return state_->cuts.layout(); }
   const organ::Organ& organ() const { return scene_->organ; }
+  const SceneRules& rules() const { return scene_->rules; }
   const State& state() const { return *state_; }
   const StepContext& context() const { return *context_; }
   // Whoever is interested in reactions watches them here.
   ExternalLoads& loads() { return *loads_; }
   const ExternalLoads& loads() const { return *loads_; }
 
-  // For drivers that move the tissue by other means than ticks, such as the search for an
-  // equilibrium: they change the state, then call resume(), and ticks go on from there as from a
-  // restored snapshot.
-  State& editable_state() { return *state_; }
-  StepContext& editable_context() { return *context_; }
-  void resume() { context_ = context_of(*state_); }
+  // The tissue begins so, m and m/s per node, at rest without velocities; relaxed stress is that of
+  // having been there for long. Ticks go on from there as from a restored snapshot.
+  void start_relaxed(std::span<const Vec3f> displacements, std::span<const Vec3f> velocities = {});
+  // A tick of time in which another integrator moves the nodes, and nothing else happens.
+  void tick_by(const std::function<void(world::World&)>& move);
 
  private:
+  friend class Equilibrium;  // moves the same state without time
+
   Simulation(std::shared_ptr<const Scene> scene, unsigned workers);
 
   void use_mark(hands::MarkAction action, std::uint8_t number);

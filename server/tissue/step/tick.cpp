@@ -6,6 +6,7 @@
 #include "common/base/timing.h"
 #include "server/tissue/contact/update_claims.h"
 #include "server/tissue/step/edit_followers.h"
+#include "server/tissue/step/rest.h"
 
 namespace trocar::step {
 
@@ -37,20 +38,7 @@ bool hand_over(const hands::Handover& handover, State& state, Outbox& outbox) {
   return true;
 }
 
-// Tissue sleeps, and pieces move as a whole, where it is swept in every tick: not in scenarios that
-// load it.
-bool may_rest(const TickDecisions& decisions, const ExternalLoads* loads) {
-  return decisions.boundary == world::Boundary::Graded && decisions.policy.steps_per_tick == 1 &&
-         loads == nullptr;
-}
-
-// Tissue that is touched wakes, and its pairs are there in the same tick.
-ContactReport find_contacts(State& state, const TickDecisions& decisions, bool may_rest,
-                            ContactWork& contact, SolveWork& solve) {
-  if (!may_rest) {
-    solve.pieces.wake(state.world);
-    hand_out_pieces(state.world, solve);
-  }
+void find_contacts(State& state, const TickDecisions& decisions, ContactWork& contact) {
   auto& found = contact.found;
   state.grasps.follow(state.tools, decisions.waiting_tools);
   contact.finder.find({.world = state.world,
@@ -61,14 +49,11 @@ ContactReport find_contacts(State& state, const TickDecisions& decisions, bool m
                        .tick = state.world.tick,
                        .held_back = decisions.waiting_tools},
                       found);
-  const bool has_self = decisions.policy.has_self_contact;
-  if (has_self) contact.self_finder.find(state.world, state.self_contacts, found);
-  if (solve.pieces.wake_touched(found, state.world)) {
-    hand_out_pieces(state.world, solve);
-    found.points.resize(found.self_begin);
-    found.self_seeds.clear();
-    if (has_self) contact.self_finder.find_again(state.world, state.self_contacts, found);
-  }
+  if (decisions.policy.has_self_contact)
+    contact.self_finder.find(state.world, state.self_contacts, found);
+}
+
+ContactReport report_of(const contact::ContactList& found, const State& state) {
   return {.nodes = static_cast<std::uint32_t>(found.seeds.size()),
           .self_pairs = static_cast<std::uint32_t>(state.self_contacts.nodes().size()),
           .is_full = found.dropped > 0,
@@ -258,18 +243,10 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
                         const TickDecisions& decisions, ExternalLoads* loads, State& state,
                         StepContext& context) {
   auto& work = context.solve;
-  auto& pieces = work.pieces;
   SolveReport report;
-  const bool is_asleep = may_rest && pieces.is_all_asleep();
-  if (may_rest) pieces.begin_step(state.world);
-  work.solver.use_energies(may_rest ? pieces.turning() : std::span<const NodeIndex>{});
-  work.solver.let_spring(may_rest ? pieces.free() : std::span<const NodeIndex>{});
-  if (!is_asleep) report = solve(contacts, may_rest, decisions, loads, state, context.near, work);
-  pieces::Pieces::Motion motion;
-  if (may_rest) {
-    motion = pieces.end_step(contacts, state.world);
-    hand_out_pieces(state.world, work);
-  }
+  if (begin_solving(may_rest, state.world, context.pieces, work.solver))
+    report = solve(contacts, may_rest, decisions, loads, state, context.near, work);
+  const auto motion = end_solving(may_rest, contacts, state.world, context.pieces, work.solver);
   report.largest_move_m += motion.awake_m;
   note_motion(report.largest_move_m, motion.carried_m, context.contact, context.cut);
   return report;
@@ -277,17 +254,33 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
 
 // An edit of the topology goes to all of the state, and to the work that follows from it.
 blades::CutReport cut_tissue(std::uint32_t waiting_tools, State& state, CutWork& cut,
-                             ContactWork& contact, NearWork& near, SolveWork& solve) {
+                             pieces::Pieces& pieces, ContactWork& contact, NearWork& near,
+                             SolveWork& solve) {
   auto& cuts = state.cuts;
-  find_tears(near.active.nodes(), state.grasps, solve.pieces.list(), state.world, cuts, cut);
+  find_tears(near.active.nodes(), state.grasps, pieces.list(), state.world, cuts, cut);
   blades::CutReport report;
   const auto edit =
       cuts.cut({state.tools, state.claims, waiting_tools}, state.world, cut.travel_m, report);
   if (edit) {
-    hand_out(*edit, state, contact, near, solve);
+    hand_out(*edit, state, pieces, contact, near, solve);
     cuts.end_edit();
   }
   return report;
+}
+
+// The frame's blood is state of the next tick, as its rounding is.
+void bleed(const hands::ToolTable& tools, const wire::SurfaceLayout& layout, bleeding::Blood& blood,
+           BleedWork& work, PublishedFrame& frame) {
+  work.tools.clear();
+  for (const auto& tool : frame.tools)
+    if (!tool.is_silent && !tool.is_inside)
+      work.tools.push_back({tool.tool, tools[tool.tool].shape, tool.verb,
+                            to_double(tool.world_from_proxy.position),
+                            length(to_double(tool.force_n))});
+  frame.figures.blood = work.bleeding.run(
+      {layout, frame.surface, frame.change.get(), frame.new_layout != nullptr}, work.tools, blood);
+  frame.blood = blood.levels;
+  frame.blood_crc = wire::blood_crc(frame.blood);
 }
 
 std::uint64_t hash_of(State& state, StateHasher& hasher) {
@@ -387,7 +380,9 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
       admit_inputs(inputs, world.tick, state.tools, state.claims, state.grasps) +
       (is_refused ? 1 : 0);
   end(Stage::Admit);
-  report.contact = find_contacts(state, decisions, has_rest, context.contact, context.solve);
+  find_contacts(state, decisions, context.contact);
+  wake_touched(has_rest, decisions.policy.has_self_contact, state, context.pieces, context.contact);
+  report.contact = report_of(contacts, state);
   end(Stage::Contacts);
   report.near = fill_queue(contacts, loads, decisions, world, context.near);
   end(Stage::Queue);
@@ -395,8 +390,8 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   end(Stage::Solve);
   state.proxies.update(contacts, world, state.tools);
   end(Stage::Contacts);
-  report.cut = cut_tissue(decisions.waiting_tools, state, context.cut, context.contact,
-                          context.near, context.solve);
+  report.cut = cut_tissue(decisions.waiting_tools, state, context.cut, context.pieces,
+                          context.contact, context.near, context.solve);
   end(Stage::Cut);
   contact::update_claims(world, state.tools, contacts, context.contact.requests, state.claims,
                          state.grasps, context.outbox.claim_events);
@@ -410,6 +405,9 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   context.frame = publish(state, contacts, queue, context.solve.solver.tissue(), report,
                           context.touches, context.surface_displacements, context.outbox);
   end(Stage::Publish);
+  if (!context.bleed) return;
+  bleed(state.tools, state.cuts.layout(), *state.blood, *context.bleed, *context.frame);
+  end(Stage::Bleed);
 }
 
 }  // namespace trocar::step

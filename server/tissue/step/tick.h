@@ -4,9 +4,11 @@
 // table of contents, and each stage says in its signature what it reads and what it writes.
 
 #include <memory>
+#include <optional>
 
 #include "common/base/checksum.h"
 #include "server/tissue/blades/tissue_cuts.h"
+#include "server/tissue/bleeding/bleeding.h"
 #include "server/tissue/contact/contact_finder.h"
 #include "server/tissue/contact/self_contact.h"
 #include "server/tissue/dynamics/block_descent.h"
@@ -26,12 +28,23 @@ namespace trocar::step {
 
 static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 
+// By these rules a scene goes on. The default: those of a session in which nothing bleeds.
+struct SceneRules {
+  // How blades cut. A method that moves nodes of the mesh needs the boundary whole and no
+  // self-contact, and its states cannot be restored.
+  cutting::Settings cutting;
+  LoadRules loads;  // what acts besides tools, of a scenario that validate() accepts
+  // It says when forces of averaged strain are taken; nothing: as dynamics::scheme_for() says for
+  // ticks of a session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
+  std::optional<dynamics::StrainScheme> strain_scheme;
+  std::optional<bleeding::Rules> bleeding;  // of a session that bleeds
+};
+
 // A scene is what is constant in a session.
 struct Scene {
   organ::Organ organ;
-  cutting::Settings cutting;
-  LoadRules loads;  // of a scenario
-  dynamics::StrainScheme strain_scheme = dynamics::StrainScheme::Implicit;
+  SceneRules rules;
+  dynamics::StrainScheme strain_scheme = dynamics::StrainScheme::Implicit;  // as chosen
 };
 
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
@@ -50,6 +63,7 @@ struct State {
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
   const dynamics::StrainScheme strain_scheme;  // forces of relaxed stress are as it has them
+  std::optional<bleeding::Blood> blood;        // of a session that bleeds
   Marks marks;
 
   void visit(world::StateArchive& archive);
@@ -89,7 +103,13 @@ struct SolveWork {
   dynamics::FarPlan far_plan;
   bool has_linear_far_field, has_tension;
   std::array<dynamics::SweepBand, kSweepLayers> bands{};  // of swept nodes, by layer
-  pieces::Pieces pieces;
+};
+
+struct BleedWork {
+  explicit BleedWork(const bleeding::Rules& rules) : bleeding(rules) {}
+
+  bleeding::Bleeding bleeding;
+  std::vector<bleeding::ToolAtWork> tools;
 };
 
 struct CutWork {
@@ -112,7 +132,9 @@ struct StepContext {
   ContactWork contact;
   NearWork near;
   SolveWork solve;
+  pieces::Pieces pieces;
   CutWork cut;
+  std::optional<BleedWork> bleed;  // of a session that bleeds
   touch::TouchTable touches;
   std::vector<Vec3f> surface_displacements;  // scratch of the publish stage
   StateHasher hasher;

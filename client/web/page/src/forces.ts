@@ -15,19 +15,27 @@ export class Forces {
     of.set(bin, newton);
     this.version++;
   }
-  get slots(): number[] { return [...this.bins.keys()].sort((a, b) => a - b); }
+  get slots(): number[] {
+    return [...this.bins.keys()].sort((a, b) => a - b);
+  }
   // Drops what is older than `tick`: a session that goes on for hours keeps its last part.
   forget(tick: number): void {
     const least = Math.floor(tick / kBinTicks);
-    for (const of of this.bins.values()) for (const bin of of.keys()) if (bin < least) of.delete(bin);
+    for (const of of this.bins.values())
+      for (const bin of of.keys()) if (bin < least) of.delete(bin);
   }
-  greatest(slot: number): number { return Math.max(0, ...(this.bins.get(slot)?.values() ?? [])); }
+  greatest(slot: number): number {
+    return Math.max(0, ...(this.bins.get(slot)?.values() ?? []));
+  }
 
   // Columns for a plot: seconds, then N of each slot, nothing where it is unknown. At most `most`
   // rows: then each has the greatest of several bins.
   columns(from: number, to: number, most: number): [number[], ...(number | null)[][]] {
-    const first = Math.floor(from / kBinTicks), last = Math.max(first, Math.floor(to / kBinTicks));
-    const each = Math.max(1, Math.ceil((last - first + 1) / most)), seconds: number[] = [], slots = this.slots;
+    const first = Math.floor(from / kBinTicks),
+      last = Math.max(first, Math.floor(to / kBinTicks));
+    const each = Math.max(1, Math.ceil((last - first + 1) / most)),
+      seconds: number[] = [],
+      slots = this.slots;
     const values: (number | null)[][] = slots.map(() => []);
     for (let bin = first; bin <= last; bin += each) {
       seconds.push((bin * kBinTicks) / 1000);

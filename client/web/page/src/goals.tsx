@@ -10,27 +10,44 @@ export interface Goal {
   seconds: number; // since the stage began
 }
 
-const minutes = (seconds: number): string => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')}`;
+const minutes = (seconds: number): string =>
+  `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')}`;
 
 function Progress(props: { goal: Goal }): JSX.Element {
-  const { stage, progress } = props.goal, seconds = Math.min(props.goal.seconds, stage.limitS), percent = Math.floor((progress?.progress ?? 0) * 100);
+  const { stage, progress } = props.goal,
+    seconds = Math.min(props.goal.seconds, stage.limitS),
+    percent = Math.floor((progress?.progress ?? 0) * 100);
   return (
     <>
-      {progress && <p class="far"><progress max={100} value={percent} aria-label="How far the goal is" /><span aria-hidden="true">{`${percent} %`}</span></p>}
+      {progress && (
+        <p class="far">
+          <progress max={100} value={percent} aria-label="How far the goal is" />
+          <span aria-hidden="true">{`${percent} %`}</span>
+        </p>
+      )}
       <dl>
         <dt>Time left</dt>
         <dd>{`${minutes(Math.max(0, stage.limitS - seconds))} of ${minutes(stage.limitS)}`}</dd>
         {stage.forceLimitN > 0 && <dt>Force</dt>}
-        {stage.forceLimitN > 0 && <dd class={progress?.isTooStrong ? 'strong' : ''}>{progress?.isTooStrong ? `more than ${stage.forceLimitN.toFixed(1)} N: be gentler` : `at most ${stage.forceLimitN.toFixed(1)} N`}</dd>}
+        {stage.forceLimitN > 0 && (
+          <dd class={progress?.isTooStrong ? 'strong' : ''}>
+            {progress?.isTooStrong
+              ? `more than ${stage.forceLimitN.toFixed(1)} N: be gentler`
+              : `at most ${stage.forceLimitN.toFixed(1)} N`}
+          </dd>
+        )}
       </dl>
     </>
   );
 }
 
 function StagePicture(props: { bytes: Uint8Array }): JSX.Element {
-  const { bytes } = props, [address, setAddress] = useState('');
+  const { bytes } = props,
+    [address, setAddress] = useState('');
   useEffect(() => {
-    const made = URL.createObjectURL(new Blob([bytes.slice()], { type: bytes[0] === 0x89 ? 'image/png' : 'image/jpeg' }));
+    const made = URL.createObjectURL(
+      new Blob([bytes.slice()], { type: bytes[0] === 0x89 ? 'image/png' : 'image/jpeg' }),
+    );
     setAddress(made);
     return () => URL.revokeObjectURL(made);
   }, [bytes]);
@@ -45,8 +62,16 @@ function Results(props: { stage: LessonStage }): JSX.Element | null {
       {stage.result.map((result, i) => (
         <li key={i}>
           <details open={stage.isOver}>
-            <summary><b>{result.name}</b>{`: ${result.isReached ? 'reached' : 'not reached'}, ${result.points.toFixed(0)} points`}</summary>
-            <ul>{result.line.map((line, k) => <li key={k}>{line}</li>)}</ul>
+            <summary>
+              <b>{result.name}</b>
+              {result.isReached ? ': reached, ' : ': not reached, '}
+              {`${result.points.toFixed(0)} points`}
+            </summary>
+            <ul>
+              {result.line.map((line, k) => (
+                <li key={k}>{line}</li>
+              ))}
+            </ul>
           </details>
         </li>
       ))}
@@ -55,20 +80,28 @@ function Results(props: { stage: LessonStage }): JSX.Element | null {
 }
 
 // `lead`: what an instructor may do; nothing for others.
-export function LessonPanel(props: { goal: Goal; lead?: { next(): void; restart(): void } }): JSX.Element {
-  const { stage } = props.goal, { lead } = props;
+export function LessonPanel(props: {
+  goal: Goal;
+  lead?: { next(): void; restart(): void };
+}): JSX.Element {
+  const { stage } = props.goal,
+    { lead } = props;
   return (
     <section class="goal" aria-labelledby="goal">
       <h2 id="goal">{stage.title}</h2>
       <div role="status">
-        {stage.isOver
-          ? <p class="over">{`The lesson is over: ${stage.points.toFixed(0)} of 100 points`}</p>
-          : <>
-              <p class="now"><small>{`Stage ${stage.stage + 1} of ${stage.stages}`}</small> <b>{stage.name}</b></p>
-              <p>{stage.text}</p>
-              {stage.picture.length > 0 && <StagePicture bytes={stage.picture} />}
-              {stage.hint !== '' && <p class="hint">{`Hint: ${stage.hint}`}</p>}
-            </>}
+        {stage.isOver ? (
+          <p class="over">{`The lesson is over: ${stage.points.toFixed(0)} of 100 points`}</p>
+        ) : (
+          <>
+            <p class="now">
+              <small>{`Stage ${stage.stage + 1} of ${stage.stages}`}</small> <b>{stage.name}</b>
+            </p>
+            <p>{stage.text}</p>
+            {stage.picture.length > 0 && <StagePicture bytes={stage.picture} />}
+            {stage.hint !== '' && <p class="hint">{`Hint: ${stage.hint}`}</p>}
+          </>
+        )}
       </div>
       {!stage.isOver && <Progress goal={props.goal} />}
       <Results stage={stage} />

@@ -7,21 +7,36 @@ import type { Replica } from './replica';
 import type { Picture } from './scene';
 import type { Session } from './session';
 
-const kMostText = 500, kMostReason = 200, kMostName = 32;
-const kPieceMs = 250, kPiecePoints = 32, kLeastPixels = 5, kViewMs = 100;
+const kMostText = 500,
+  kMostReason = 200,
+  kMostName = 32;
+const kPieceMs = 250,
+  kPiecePoints = 32,
+  kLeastPixels = 5,
+  kViewMs = 100;
 
 const bytesOf = (text: string): number => new TextEncoder().encode(text).length;
 // What the server takes: a pasted text may hold characters that cannot be seen.
-const lineOf = (text: string): string => text.replace(/[\p{C}\u2028\u2029\u{E0000}-\u{10FFFF}]/gu, ' ').trim();
+const lineOf = (text: string): string =>
+  text.replace(/[\p{C}\u2028\u2029\u{E0000}-\u{10FFFF}]/gu, ' ').trim();
 
 // One thing that has to be asked before it is done; `field`: what the person types for it.
-export interface Question { title: string; verb: string; field?: { label: string; value: string; most: number; mayBeEmpty?: boolean }; act(text: string): void }
+export interface Question {
+  title: string;
+  verb: string;
+  field?: { label: string; value: string; most: number; mayBeEmpty?: boolean };
+  act(text: string): void;
+}
 
 export function Ask(props: { question: Question; onDone(): void }): JSX.Element {
-  const { question } = props, [text, setText] = useState(question.field?.value ?? '');
+  const { question } = props,
+    [text, setText] = useState(question.field?.value ?? '');
   const first = useRef<HTMLInputElement & HTMLButtonElement>(null);
   useEffect(() => first.current?.focus(), []);
-  const fits = !question.field || ((lineOf(text) !== '' || question.field.mayBeEmpty === true) && bytesOf(lineOf(text)) <= question.field.most);
+  const fits =
+    !question.field ||
+    ((lineOf(text) !== '' || question.field.mayBeEmpty === true) &&
+      bytesOf(lineOf(text)) <= question.field.most);
   const submit = (event: Event): void => {
     event.preventDefault();
     if (!fits) return;
@@ -32,43 +47,121 @@ export function Ask(props: { question: Question; onDone(): void }): JSX.Element 
     <div class="ask" role="alertdialog" aria-label={question.title}>
       <form onSubmit={submit}>
         <p>{question.title}</p>
-        {question.field && <label>{question.field.label}<input value={text} onInput={e => setText(e.currentTarget.value)} ref={first} /></label>}
-        <button class="main" disabled={!fits} {...(question.field ? {} : { ref: first })}>{question.verb}</button>
-        <button type="button" onClick={props.onDone}>Cancel</button>
+        {question.field && (
+          <label>
+            {question.field.label}
+            <input value={text} onInput={e => setText(e.currentTarget.value)} ref={first} />
+          </label>
+        )}
+        <button class="main" disabled={!fits} {...(question.field ? {} : { ref: first })}>
+          {question.verb}
+        </button>
+        <button type="button" onClick={props.onDone}>
+          Cancel
+        </button>
       </form>
     </div>
   );
 }
 
 // What may be done with one person, beside the name.
-export function Manage(props: { session: Session; person: Participant; people: Participant[]; own: number | null; onAsk(question: Question): void }): JSX.Element | null {
-  const { session, person: p } = props, [isOpen, setIsOpen] = useState(false);
+export function Manage(props: {
+  session: Session;
+  person: Participant;
+  people: Participant[];
+  own: number | null;
+  onAsk(question: Question): void;
+}): JSX.Element | null {
+  const { session, person: p } = props,
+    [isOpen, setIsOpen] = useState(false);
   const act = (action: TeachAction, text = ''): void => session.teach(action, p, text);
-  const hasTools = p.tool.length > 0, isFrozen = p.frozenBy !== '';
+  const hasTools = p.tool.length > 0,
+    isFrozen = p.frozenBy !== '';
   const receivers = props.people.filter(one => one.slot !== p.slot && one.tool.length > 0);
   const handOver = (choice: string): void => {
-    const [slot, tool] = choice.split(' ').map(Number), receiver = receivers.find(one => one.slot === slot);
+    const [slot, tool] = choice.split(' ').map(Number),
+      receiver = receivers.find(one => one.slot === slot);
     if (receiver !== undefined && tool !== undefined) session.handOver(p, tool, receiver);
     setIsOpen(false);
   };
-  const rename = (): void => props.onAsk({ title: `Rename ${p.name}, for everybody?`, verb: 'Rename', field: { label: 'New name', value: p.name, most: kMostName }, act: text => act(TeachAction.TEACH_RENAME, text) });
-  const expel = (): void => props.onAsk({ title: `Put ${p.name} out of the session? The join code lets nobody in again until you admit them.`, verb: 'Put out', field: { label: 'Reason, which everybody reads', value: '', most: kMostReason }, act: text => act(TeachAction.TEACH_EXPEL, text) });
+  const rename = (): void =>
+    props.onAsk({
+      title: `Rename ${p.name}, for everybody?`,
+      verb: 'Rename',
+      field: { label: 'New name', value: p.name, most: kMostName },
+      act: text => act(TeachAction.TEACH_RENAME, text),
+    });
+  const expel = (): void =>
+    props.onAsk({
+      title:
+        `Put ${p.name} out of the session? ` +
+        'The join code lets nobody in again until you admit them.',
+      verb: 'Put out',
+      field: { label: 'Reason, which everybody reads', value: '', most: kMostReason },
+      act: text => act(TeachAction.TEACH_EXPEL, text),
+    });
   return (
     <>
-      <button class={`manage${hasTools ? ' below' : ''}`} aria-expanded={isOpen} onClick={() => setIsOpen(!isOpen)} aria-label={`Manage ${p.name}`}>Manage</button>
+      <button
+        class={`manage${hasTools ? ' below' : ''}`}
+        aria-expanded={isOpen}
+        onClick={() => setIsOpen(!isOpen)}
+        aria-label={`Manage ${p.name}`}
+      >
+        Manage
+      </button>
       {isOpen && (
         <div class="acts">
-          {hasTools && <button aria-pressed={isFrozen} onClick={() => act(isFrozen ? TeachAction.TEACH_RELEASE : TeachAction.TEACH_FREEZE)} title="The tools stay where they are, whatever the hands do">{isFrozen ? 'Release tools' : 'Freeze tools'}</button>}
-          {hasTools && <button onClick={() => act(TeachAction.TEACH_TAKE_CLAIM)} title="Jaws open and blades go up, until the hand has let go">Take claim away</button>}
+          {hasTools && (
+            <button
+              aria-pressed={isFrozen}
+              onClick={() => act(isFrozen ? TeachAction.TEACH_RELEASE : TeachAction.TEACH_FREEZE)}
+              title="The tools stay where they are, whatever the hands do"
+            >
+              {isFrozen ? 'Release tools' : 'Freeze tools'}
+            </button>
+          )}
+          {hasTools && (
+            <button
+              onClick={() => act(TeachAction.TEACH_TAKE_CLAIM)}
+              title="Jaws open and blades go up, until the hand has let go"
+            >
+              Take claim away
+            </button>
+          )}
           {hasTools && receivers.length > 0 && (
-            <select aria-label={`Hand over an instrument of ${p.name}`} title="It goes on holding, and moves with the receiver's hand" value="" onChange={e => handOver(e.currentTarget.value)}>
+            <select
+              aria-label={`Hand over an instrument of ${p.name}`}
+              title="It goes on holding, and moves with the receiver's hand"
+              value=""
+              onChange={e => handOver(e.currentTarget.value)}
+            >
               <option value="">Hand over ...</option>
-              {receivers.flatMap(r => p.tool.map((_, i) => <option key={`${r.slot} ${i}`} value={`${r.slot} ${i}`}>{`${p.tool.length > 1 ? `instrument ${i + 1} ` : ''}to ${r.name}`}</option>))}
+              {receivers.flatMap(r =>
+                p.tool.map((_, i) => (
+                  <option
+                    key={`${r.slot} ${i}`}
+                    value={`${r.slot} ${i}`}
+                  >{`${p.tool.length > 1 ? `instrument ${i + 1} ` : ''}to ${r.name}`}</option>
+                )),
+              )}
             </select>
           )}
-          <button aria-pressed={p.leadsView} onClick={() => act(p.leadsView ? TeachAction.TEACH_END_VIEW : TeachAction.TEACH_GIVE_VIEW)} title="Everybody may follow this person's view">{p.leadsView ? 'End the view' : 'Give the view'}</button>
+          <button
+            aria-pressed={p.leadsView}
+            onClick={() =>
+              act(p.leadsView ? TeachAction.TEACH_END_VIEW : TeachAction.TEACH_GIVE_VIEW)
+            }
+            title="Everybody may follow this person's view"
+          >
+            {p.leadsView ? 'End the view' : 'Give the view'}
+          </button>
           <button onClick={rename}>Rename</button>
-          {props.own !== p.slot && p.role !== 3 && <button class="bad" onClick={expel}>Put out</button>}
+          {props.own !== p.slot && p.role !== 3 && (
+            <button class="bad" onClick={expel}>
+              Put out
+            </button>
+          )}
         </div>
       )}
     </>
@@ -81,37 +174,86 @@ export function Door(props: { session: Session; list: Participants | null }): JS
   if (list === null) return null;
   return (
     <section class="door" aria-label="Newcomers">
-      <button aria-pressed={list.isClosed} onClick={() => session.teach(list.isClosed ? TeachAction.TEACH_OPEN : TeachAction.TEACH_CLOSE)}>{list.isClosed ? 'Open to newcomers' : 'Close to newcomers'}</button>
+      <button
+        aria-pressed={list.isClosed}
+        onClick={() =>
+          session.teach(list.isClosed ? TeachAction.TEACH_OPEN : TeachAction.TEACH_CLOSE)
+        }
+      >
+        {list.isClosed ? 'Open to newcomers' : 'Close to newcomers'}
+      </button>
       {list.waiting.map(name => (
-        <p key={name}><b>{name}</b> wants to come in <button onClick={() => session.teach(TeachAction.TEACH_ADMIT, null, name)} aria-label={`Admit ${name}`}>Admit</button></p>
+        <p key={name}>
+          <b>{name}</b> wants to come in{' '}
+          <button
+            onClick={() => session.teach(TeachAction.TEACH_ADMIT, null, name)}
+            aria-label={`Admit ${name}`}
+          >
+            Admit
+          </button>
+        </p>
       ))}
     </section>
   );
 }
 
 export function Say(props: { session: Session; mayNote: boolean }): JSX.Element {
-  const [text, setText] = useState(''), size = bytesOf(lineOf(text)), fits = size > 0 && size <= kMostText;
+  const [text, setText] = useState(''),
+    size = bytesOf(lineOf(text)),
+    fits = size > 0 && size <= kMostText;
   const send = (action: TeachAction): void => {
     if (!fits) return;
     props.session.teach(action, null, lineOf(text));
     setText('');
   };
   return (
-    <form class="say" onSubmit={event => { event.preventDefault(); send(TeachAction.TEACH_CHAT); }}>
-      <input value={text} aria-label="A line for everybody" placeholder="A line for everybody" autocomplete="off" onInput={e => setText(e.currentTarget.value)} />
+    <form
+      class="say"
+      onSubmit={event => {
+        event.preventDefault();
+        send(TeachAction.TEACH_CHAT);
+      }}
+    >
+      <input
+        value={text}
+        aria-label="A line for everybody"
+        placeholder="A line for everybody"
+        autocomplete="off"
+        onInput={e => setText(e.currentTarget.value)}
+      />
       <button disabled={!fits}>Send</button>
-      {props.mayNote && <button type="button" disabled={!fits} title="A note with this time, for the debrief" onClick={() => send(TeachAction.TEACH_NOTE)}>Note</button>}
-      {size > kMostText && <p class="fault" role="alert">{`Too long: ${size} of ${kMostText} bytes.`}</p>}
+      {props.mayNote && (
+        <button
+          type="button"
+          disabled={!fits}
+          title="A note with this time, for the debrief"
+          onClick={() => send(TeachAction.TEACH_NOTE)}
+        >
+          Note
+        </button>
+      )}
+      {size > kMostText && (
+        <p class="fault" role="alert">{`Too long: ${size} of ${kMostText} bytes.`}</p>
+      )}
     </form>
   );
 }
 
 // Draws on the organ while it is on. The line goes out in pieces, so that it is seen as it grows.
-function usePen(isOn: boolean, session: Session, replica: Replica, picture: { current: Picture | null }): void {
+function usePen(
+  isOn: boolean,
+  session: Session,
+  replica: Replica,
+  picture: { current: Picture | null },
+): void {
   useEffect(() => {
-    const canvas = picture.current?.canvas, box = canvas?.parentElement;
+    const canvas = picture.current?.canvas,
+      box = canvas?.parentElement;
     if (!isOn || !canvas || !box) return undefined;
-    let points: { triangle: number; weights: [number, number] }[] = [], isDown = false, last: [number, number] = [0, 0], sentMs = 0;
+    let points: { triangle: number; weights: [number, number] }[] = [],
+      isDown = false,
+      last: [number, number] = [0, 0],
+      sentMs = 0;
     const flush = (isEnd: boolean): void => {
       if (points.length > (isEnd ? 0 : 1)) session.stroke(points);
       points = isEnd ? [] : points.slice(-1); // the next piece begins where this one ends
@@ -120,7 +262,11 @@ function usePen(isOn: boolean, session: Session, replica: Replica, picture: { cu
     const add = (event: PointerEvent): void => {
       const rect = canvas.getBoundingClientRect();
       last = [event.clientX, event.clientY];
-      const at = picture.current?.pick((event.clientX - rect.left) / rect.width, (event.clientY - rect.top) / rect.height) ?? null;
+      const at =
+        picture.current?.pick(
+          (event.clientX - rect.left) / rect.width,
+          (event.clientY - rect.top) / rect.height,
+        ) ?? null;
       const place = at === null ? null : replica.attach(at);
       if (place === null) return flush(true); // beside the organ the line has a gap
       points.push(place);
@@ -160,8 +306,17 @@ function usePen(isOn: boolean, session: Session, replica: Replica, picture: { cu
 }
 
 // Buttons of the picture: drawing, and the view to follow.
-export function ViewTools(props: { session: Session; replica: Replica; picture: { current: Picture | null }; mayDraw: boolean; leader: Participant | undefined; own: number | null }): JSX.Element {
-  const { session, picture, leader, own } = props, [draws, setDraws] = useState(false), [follows, setFollows] = useState(false);
+export function ViewTools(props: {
+  session: Session;
+  replica: Replica;
+  picture: { current: Picture | null };
+  mayDraw: boolean;
+  leader: Participant | undefined;
+  own: number | null;
+}): JSX.Element {
+  const { session, picture, leader, own } = props,
+    [draws, setDraws] = useState(false),
+    [follows, setFollows] = useState(false);
   usePen(draws && props.mayDraw, session, props.replica, picture);
   const leads = leader !== undefined && leader.slot === own;
   useEffect(() => {
@@ -188,11 +343,34 @@ export function ViewTools(props: { session: Session; replica: Replica; picture: 
   }, [followed.current]);
   return (
     <>
-      {props.mayDraw && <button aria-pressed={draws} onClick={() => setDraws(!draws)} title="Draw on the organ, for everybody">Draw</button>}
-      {props.mayDraw && <button onClick={() => session.teach(TeachAction.TEACH_WIPE)} title="Wipe what is drawn, for everybody">Wipe</button>}
-      {leader && !leads && <button aria-pressed={follows} onClick={() => setFollows(!follows)}>{`View of ${leader.name}`}</button>}
-      {leads && <span class="choice shared" role="status">Others may follow your view</span>}
+      {props.mayDraw && (
+        <button
+          aria-pressed={draws}
+          onClick={() => setDraws(!draws)}
+          title="Draw on the organ, for everybody"
+        >
+          Draw
+        </button>
+      )}
+      {props.mayDraw && (
+        <button
+          onClick={() => session.teach(TeachAction.TEACH_WIPE)}
+          title="Wipe what is drawn, for everybody"
+        >
+          Wipe
+        </button>
+      )}
+      {leader && !leads && (
+        <button
+          aria-pressed={follows}
+          onClick={() => setFollows(!follows)}
+        >{`View of ${leader.name}`}</button>
+      )}
+      {leads && (
+        <span class="choice shared" role="status">
+          Others may follow your view
+        </span>
+      )}
     </>
   );
 }
-

@@ -6,17 +6,21 @@ export interface Link {
   name: string;
   session: string; // "HOST:PORT" of one of several; empty: the first
   recordingsKey: string;
-  file: string; // of the recordings
+  file: string; // one of the recordings
   seconds: number | null; // where in it to begin
   view: View | null;
   speed: number | null;
-  bookmarks: string; // to be read by readBookmarks; empty: none
+  bookmarks: string; // readBookmarks reads them; empty: none
 }
 
 // From where the picture is seen, m.
-export interface View { eye: [number, number, number]; target: [number, number, number] }
+export interface View {
+  eye: [number, number, number];
+  target: [number, number, number];
+}
 
-const kName = 'trocar-name', kFarthest = 5;
+const kName = 'trocar-name',
+  kFarthest = 5;
 
 // Six numbers; null if they cannot be a view.
 function readView(text: string | null): View | null {
@@ -25,13 +29,15 @@ function readView(text: string | null): View | null {
   const [a = 0, b = 0, c = 0, d = 0, e = 0, f = 0] = n;
   return Math.hypot(a - d, b - e, c - f) < 1e-3 ? null : { eye: [a, b, c], target: [d, e, f] };
 }
-const writeView = (view: View): string => [...view.eye, ...view.target].map(x => x.toFixed(4)).join(',');
+const writeView = (view: View): string =>
+  [...view.eye, ...view.target].map(x => x.toFixed(4)).join(',');
 
 export function readLink(hash: string): Link {
   const given = new URLSearchParams(hash.replace(/^#/, ''));
-  const seconds = Number(given.get('t') ?? 'none'), speed = Number(given.get('speed') ?? 'none');
+  const seconds = Number(given.get('t') ?? 'none'),
+    speed = Number(given.get('speed') ?? 'none');
   return {
-    code: given.get('join') === 'CODE' ? '' : given.get('join') ?? '',
+    code: given.get('join') === 'CODE' ? '' : (given.get('join') ?? ''),
     role: given.get('role') === 'instructor' ? 'instructor' : 'observer',
     name: given.get('name') ?? rememberedName(),
     session: given.get('session') ?? '',
@@ -45,7 +51,12 @@ export function readLink(hash: string): Link {
 }
 
 // What a link to a recording may say besides its time.
-export interface Moment { seconds: number; view?: View | null; speed?: number; bookmarks?: string }
+export interface Moment {
+  seconds: number;
+  view?: View | null;
+  speed?: number;
+  bookmarks?: string;
+}
 export function recordingLink(key: string, file: string, moment: Moment): string {
   const what = new URLSearchParams({ recordings: key, file, t: moment.seconds.toFixed(2) });
   if (moment.view) what.set('view', writeView(moment.view));
@@ -55,10 +66,18 @@ export function recordingLink(key: string, file: string, moment: Moment): string
 }
 
 function rememberedName(): string {
-  try { return localStorage.getItem(kName) ?? ''; } catch { return ''; }
+  try {
+    return localStorage.getItem(kName) ?? '';
+  } catch {
+    return '';
+  }
 }
 export function rememberName(name: string): void {
-  try { localStorage.setItem(kName, name); } catch { /* a browser that keeps nothing: it is asked again */ }
+  try {
+    localStorage.setItem(kName, name);
+  } catch {
+    /* a browser that keeps nothing: it is asked again */
+  }
 }
 
 // 1 to 32 bytes, as the server wants it; a line that says what is wrong, or nothing.

@@ -2,7 +2,17 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import { LessonAction, RecordingStatus, TeachAction, type Envelope, type LessonProgress, type LessonStage, type Participant, type Participants, type SessionPace } from './gen/proto/wire_pb';
+import {
+  LessonAction,
+  RecordingStatus,
+  TeachAction,
+  type Envelope,
+  type LessonProgress,
+  type LessonStage,
+  type Participant,
+  type Participants,
+  type SessionPace,
+} from './gen/proto/wire_pb';
 import { Forces } from './forces';
 import { BloodPanel } from './blood';
 import { LessonPanel } from './goals';
@@ -16,22 +26,48 @@ import type { Picture } from './scene';
 import { Session } from './session';
 import { clock, forceOf, guideOf, Stage } from './stage';
 
-const kPanelMs = 100, kShownTicks = 30_000, kMostEvents = 500;
+const kPanelMs = 100,
+  kShownTicks = 30_000,
+  kMostEvents = 500;
 
-export function Live(props: { link: Link; replica: Replica; onEnd(why: string): void }): JSX.Element {
+export function Live(props: {
+  link: Link;
+  replica: Replica;
+  onEnd(why: string): void;
+}): JSX.Element {
   const { replica } = props;
-  const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [asks, setAsks] = useState<Question | null>(null);
-  const people = useRef<Participant[]>([]), list = useRef<Participants | null>(null), events = useRef<RecordedEvent[]>([]);
-  const forces = useMemo(() => new Forces(), []), own = useRef<number | null>(null), recording = useRef(''), isRecorded = useRef<boolean | null>(null), crc = useRef('');
-  const picture = useRef<Picture | null>(null), stage = useRef<LessonStage | null>(null), progress = useRef<LessonProgress | null>(null);
-  const pace = useRef<SessionPace | null>(null), marks = useRef<string[]>([]), mayPace = useRef(false);
-  const guide = useMemo(() => guideOf(() => people.current, slot => replica.slotColour(slot)), []);
+  const [, redraw] = useState(0),
+    [follows, setFollows] = useState<number | null>(null),
+    [asks, setAsks] = useState<Question | null>(null);
+  const people = useRef<Participant[]>([]),
+    list = useRef<Participants | null>(null),
+    events = useRef<RecordedEvent[]>([]);
+  const forces = useMemo(() => new Forces(), []),
+    own = useRef<number | null>(null),
+    recording = useRef(''),
+    isRecorded = useRef<boolean | null>(null),
+    crc = useRef('');
+  const picture = useRef<Picture | null>(null),
+    stage = useRef<LessonStage | null>(null),
+    progress = useRef<LessonProgress | null>(null);
+  const pace = useRef<SessionPace | null>(null),
+    marks = useRef<string[]>([]),
+    mayPace = useRef(false);
+  const guide = useMemo(
+    () =>
+      guideOf(
+        () => people.current,
+        slot => replica.slotColour(slot),
+      ),
+    [],
+  );
 
   const session = useMemo(() => {
     const note = (tick: number, kind: EventKind, text: string): void => {
       if (text === '') return;
       const last = events.current.at(-1);
-      if (last?.text === text && kind === 'refusal') return; // a refused grasp is tried again and again
+      // A refused grasp is tried again and again.
+      if (last?.text === text && kind === 'refusal') return;
       events.current.push({ tick, kind, text });
       if (events.current.length > kMostEvents) events.current.shift();
     };
@@ -49,8 +85,14 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
         people.current = [...value.participant].sort((a, b) => a.slot - b.slot);
       }
       if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
-      if (kind === 'markEvent') note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
-      if (kind === 'teachEvent') note(Number(value.tick), value.isDone && !value.isTrouble ? kindOfTeaching(value.action) : 'refusal', value.text);
+      if (kind === 'markEvent')
+        note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
+      if (kind === 'teachEvent')
+        note(
+          Number(value.tick),
+          value.isDone && !value.isTrouble ? kindOfTeaching(value.action) : 'refusal',
+          value.text,
+        );
       if (kind === 'lessonStage') {
         if (stage.current?.beginTick !== value.beginTick) progress.current = null;
         stage.current = value;
@@ -59,17 +101,21 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       if (kind === 'markList') marks.current = value.name;
       if (kind === 'lessonProgress') progress.current = value;
       if (kind === 'recordingState') {
-        recording.current = value.text;  // empty while nothing is wrong
-        isRecorded.current = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_GAPPED;
+        recording.current = value.text; // empty while nothing is wrong
+        isRecorded.current =
+          value.status === RecordingStatus.RECORDING_WHOLE ||
+          value.status === RecordingStatus.RECORDING_GAPPED;
       }
-      if (kind === 'barrier') crc.current = replica.ownCrc === value.surfaceCrc >>> 0 ? 'same' : 'other';
+      if (kind === 'barrier')
+        crc.current = replica.ownCrc === value.surfaceCrc >>> 0 ? 'same' : 'other';
     };
     return new Session(props.link, replica, { onMessage, onChange: () => redraw(n => n + 1) });
   }, []);
 
   useEffect(() => {
     const timer = window.setInterval(() => {
-      for (const tool of replica.tools()) forces.add(replica.newestTick, tool.slot >> 1, forceOf(tool));
+      for (const tool of replica.tools())
+        forces.add(replica.newestTick, tool.slot >> 1, forceOf(tool));
       forces.forget(replica.newestTick - 2 * kShownTicks);
       redraw(n => n + 1);
     }, kPanelMs);
@@ -78,21 +124,38 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       session.leave();
     };
   }, []);
-  useEffect(() => { if (session.state === 'ended') props.onEnd(session.why); }, [session.state]);
+  useEffect(() => {
+    if (session.state === 'ended') props.onEnd(session.why);
+  }, [session.state]);
   // Tests and curious people read figures here.
   useEffect(() => {
-    Object.assign(window, { trocar: { replica, session, picture: () => picture.current, barrier: () => crc.current } });
+    Object.assign(window, {
+      trocar: { replica, session, picture: () => picture.current, barrier: () => crc.current },
+    });
   }, []);
 
-  const now = Math.max(0, replica.newestTick), age = session.shownAgeMs;
-  const isPaused = session.state === 'live' && (pace.current?.isPaused ?? false), rate = pace.current?.rate ?? 1;
-  const isOld = session.state === 'away' || (!isPaused && age !== null && age > 1000), isLate = !isPaused && age !== null && age > session.oldAfterMs;
+  const now = Math.max(0, replica.newestTick),
+    age = session.shownAgeMs;
+  const isPaused = session.state === 'live' && (pace.current?.isPaused ?? false),
+    rate = pace.current?.rate ?? 1;
+  const isOld = session.state === 'away' || (!isPaused && age !== null && age > 1000),
+    isLate = !isPaused && age !== null && age > session.oldAfterMs;
   const mayMark = props.link.role === 'instructor' && session.state === 'live';
   const leader = people.current.find(p => p.leadsView);
-  const end = (): void => setAsks({ title: 'End the session for everybody? The recording is closed.', verb: 'End for everybody', act: () => session.teach(TeachAction.TEACH_END) });
+  const end = (): void =>
+    setAsks({
+      title: 'End the session for everybody? The recording is closed.',
+      verb: 'End for everybody',
+      act: () => session.teach(TeachAction.TEACH_END),
+    });
   const lead = {
     next: () => session.lead(LessonAction.LESSON_NEXT),
-    restart: () => setAsks({ title: 'Begin the lesson anew, from its first stage? The tissue stays as it is.', verb: 'Restart', act: () => session.lead(LessonAction.LESSON_RESTART) }),
+    restart: () =>
+      setAsks({
+        title: 'Begin the lesson anew, from its first stage? The tissue stays as it is.',
+        verb: 'Restart',
+        act: () => session.lead(LessonAction.LESSON_RESTART),
+      }),
   };
   const onKey = (event: KeyboardEvent): void => {
     if (event.key === 'Escape') setAsks(null);
@@ -102,38 +165,130 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       <header>
         <h1>Trocar</h1>
         <span class="time">{clock(now / 1000)}</span>
-        <span class={`age${isOld ? ' old' : isLate ? ' late' : ''}`} role="status" title="How old the picture is that you see">
-          {session.state === 'joining' ? 'joining' : session.state === 'away' ? `old since ${Math.round((performance.now() - session.awaySince) / 1000)} s` : isPaused ? 'paused' : age === null ? 'live' : `${Math.max(0, Math.round(age))} ms old`}
+        <span
+          class={`age${isOld ? ' old' : isLate ? ' late' : ''}`}
+          role="status"
+          title="How old the picture is that you see"
+        >
+          {session.state === 'joining'
+            ? 'joining'
+            : session.state === 'away'
+              ? `old since ${Math.round((performance.now() - session.awaySince) / 1000)} s`
+              : isPaused
+                ? 'paused'
+                : age === null
+                  ? 'live'
+                  : `${Math.max(0, Math.round(age))} ms old`}
         </span>
-        {session.state === 'live' && rate < 1 && <span class="age late" role="status">{`time at ${Math.round(rate * 100)} %`}</span>}
-        {isRecorded.current !== null && <span class="age">{isRecorded.current ? 'recorded' : 'not recorded'}</span>}
+        {session.state === 'live' && rate < 1 && (
+          <span class="age late" role="status">{`time at ${Math.round(rate * 100)} %`}</span>
+        )}
+        {isRecorded.current !== null && (
+          <span class="age">{isRecorded.current ? 'recorded' : 'not recorded'}</span>
+        )}
         {recording.current && <span class="age late">{recording.current}</span>}
         <span class="space" />
         {mayMark && mayPace.current && <Pace session={session} pace={pace.current} />}
         {mayMark && <Marks session={session} marks={marks.current} onAsk={setAsks} />}
-        {mayMark && <button class="bad" onClick={end}>End session</button>}
+        {mayMark && (
+          <button class="bad" onClick={end}>
+            End session
+          </button>
+        )}
         <button onClick={session.leave}>Leave</button>
       </header>
       <main>
-        <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }}
-          tools={session.state === 'live' && <ViewTools session={session} replica={replica} picture={picture} mayDraw={mayMark} leader={leader} own={own.current} />} {...(mayMark ? { onPoint: place => session.point(place) } : {})}>
-          {session.state === 'away' && <p class="banner" role="alert">{session.why} The picture is old; the page comes back by itself.</p>}
-          {isPaused && <p class="banner" role="status">{`${pace.current?.by || 'Somebody'} has paused the session.`}</p>}
+        <Stage
+          replica={replica}
+          guide={guide}
+          isOld={isOld}
+          follows={follows}
+          people={people.current}
+          onFollow={setFollows}
+          onPicture={() => undefined}
+          onReady={p => {
+            picture.current = p;
+          }}
+          tools={
+            session.state === 'live' && (
+              <ViewTools
+                session={session}
+                replica={replica}
+                picture={picture}
+                mayDraw={mayMark}
+                leader={leader}
+                own={own.current}
+              />
+            )
+          }
+          {...(mayMark ? { onPoint: place => session.point(place) } : {})}
+        >
+          {session.state === 'away' && (
+            <p class="banner" role="alert">
+              {session.why} The picture is old; the page comes back by itself.
+            </p>
+          )}
+          {isPaused && (
+            <p
+              class="banner"
+              role="status"
+            >{`${pace.current?.by || 'Somebody'} has paused the session.`}</p>
+          )}
           {session.state === 'joining' && <p class="banner">Joining the session</p>}
-          {session.state === 'live' && replica.frames === 0 && <p class="banner">Waiting for the organ</p>}
+          {session.state === 'live' && replica.frames === 0 && (
+            <p class="banner">Waiting for the organ</p>
+          )}
         </Stage>
         {asks !== null && <Ask key={asks.title} question={asks} onDone={() => setAsks(null)} />}
       </main>
       <aside>
-        {stage.current && <LessonPanel goal={{ stage: stage.current, progress: progress.current, seconds: progress.current?.seconds ?? 0 }} {...(mayMark ? { lead } : {})} />}
+        {stage.current && (
+          <LessonPanel
+            goal={{
+              stage: stage.current,
+              progress: progress.current,
+              seconds: progress.current?.seconds ?? 0,
+            }}
+            {...(mayMark ? { lead } : {})}
+          />
+        )}
         <BloodPanel blood={replica.blood()} />
-        <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} waits={slot => replica.waits(slot)}
-          {...(mayMark ? { extra: person => <Manage session={session} person={person} people={people.current} own={own.current} onAsk={setAsks} /> } : {})} />
+        <People
+          people={people.current}
+          tools={replica.tools()}
+          own={own.current}
+          colourOf={slot => replica.slotColour(slot)}
+          follows={follows}
+          onFollow={setFollows}
+          waits={slot => replica.waits(slot)}
+          {...(mayMark
+            ? {
+                extra: person => (
+                  <Manage
+                    session={session}
+                    person={person}
+                    people={people.current}
+                    own={own.current}
+                    onAsk={setAsks}
+                  />
+                ),
+              }
+            : {})}
+        />
         {mayMark && <Door session={session} list={list.current} />}
         <section aria-labelledby="forces">
-          <h2 id="forces">Forces <small>last 30 s</small></h2>
-          <ForcePlot forces={forces} from={Math.max(0, now - kShownTicks)} to={now} now={now} height={130}
-            nameOf={slot => people.current.find(p => p.slot === slot)?.name ?? `hand ${slot + 1}`} colourOf={slot => replica.slotColour(slot)} />
+          <h2 id="forces">
+            Forces <small>last 30 s</small>
+          </h2>
+          <ForcePlot
+            forces={forces}
+            from={Math.max(0, now - kShownTicks)}
+            to={now}
+            now={now}
+            height={130}
+            nameOf={slot => people.current.find(p => p.slot === slot)?.name ?? `hand ${slot + 1}`}
+            colourOf={slot => replica.slotColour(slot)}
+          />
         </section>
         <Events events={events.current} now={now} empty="Nothing has happened yet." />
         {session.state === 'live' && <Say session={session} mayNote={mayMark} />}

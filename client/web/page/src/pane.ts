@@ -4,7 +4,8 @@ import { PerspectiveCamera, Quaternion, Vector3 } from 'three';
 import type { Lens, Tool } from './replica';
 
 const kSettleSeconds = 0.15;
-const kBehind = 0.24, kAbove = 0.07; // m from the tip, of a view along a tool
+const kBehind = 0.24,
+  kAbove = 0.07; // m from the tip, of a view along a tool
 
 export type ViewCount = 1 | 2 | 4;
 // Left, top, width and height as shares of the canvas, from its upper left.
@@ -13,8 +14,22 @@ export type Part = readonly [number, number, number, number];
 // Two views stand beside each other, or one above the other where the canvas is higher than wide.
 export function partsOf(count: ViewCount, isHigh: boolean): Part[] {
   if (count === 1) return [[0, 0, 1, 1]];
-  if (count === 2) return isHigh ? [[0, 0, 1, 0.5], [0, 0.5, 1, 0.5]] : [[0, 0, 0.5, 1], [0.5, 0, 0.5, 1]];
-  return [[0, 0, 0.5, 0.5], [0.5, 0, 0.5, 0.5], [0, 0.5, 0.5, 0.5], [0.5, 0.5, 0.5, 0.5]];
+  if (count === 2)
+    return isHigh
+      ? [
+          [0, 0, 1, 0.5],
+          [0, 0.5, 1, 0.5],
+        ]
+      : [
+          [0, 0, 0.5, 1],
+          [0.5, 0, 0.5, 1],
+        ];
+  return [
+    [0, 0, 0.5, 0.5],
+    [0.5, 0, 0.5, 0.5],
+    [0, 0.5, 0.5, 0.5],
+    [0.5, 0.5, 0.5, 0.5],
+  ];
 }
 
 export class Pane {
@@ -29,11 +44,18 @@ export class Pane {
   private lens: Lens | null = null;
 
   // `yaw` turns a view around the organ, so that several differ; `pitch` is how far from above.
-  constructor(private readonly yaw: number, private readonly pitch: number) {}
+  constructor(
+    private readonly yaw: number,
+    private readonly pitch: number,
+  ) {}
 
   // The camera that draws.
-  get drawn(): PerspectiveCamera { return this.lens ? this.lensCamera : this.camera; }
-  get isEndoscope(): boolean { return this.lens?.isEndoscope ?? false; }
+  get drawn(): PerspectiveCamera {
+    return this.lens ? this.lensCamera : this.camera;
+  }
+  get isEndoscope(): boolean {
+    return this.lens?.isEndoscope ?? false;
+  }
   // Sees as a lens does; null: from its own place.
   lookThrough(lens: Lens | null): void {
     this.lens = lens;
@@ -42,7 +64,7 @@ export class Pane {
     c.position.set(...lens.eye);
     c.up.set(...lens.up);
     c.lookAt(c.position.clone().add(new Vector3(...lens.forward)));
-    c.fov = Math.atan(lens.tanHalfHeight) * 360 / Math.PI;
+    c.fov = (Math.atan(lens.tanHalfHeight) * 360) / Math.PI;
     c.aspect = this.camera.aspect;
     c.updateProjectionMatrix();
   }
@@ -58,23 +80,31 @@ export class Pane {
   }
 
   frame(centre: Vector3, radius: number): void {
-    const distance = radius / 0.2867 * 0.9 / Math.min(1, this.camera.aspect * 0.9), flat = Math.cos(this.pitch) * distance;
+    const distance = ((radius / 0.2867) * 0.9) / Math.min(1, this.camera.aspect * 0.9),
+      flat = Math.cos(this.pitch) * distance;
     this.target.copy(centre);
-    this.camera.position.set(centre.x + Math.sin(this.yaw) * flat, centre.y + Math.sin(this.pitch) * distance, centre.z + Math.cos(this.yaw) * flat);
+    this.camera.position.set(
+      centre.x + Math.sin(this.yaw) * flat,
+      centre.y + Math.sin(this.pitch) * distance,
+      centre.z + Math.cos(this.yaw) * flat,
+    );
     this.isFramed = true;
   }
 
   follow(tools: Tool[], seconds: number): void {
     const tool = tools.find(t => t.slot >> 1 === this.follows);
     if (!tool) return;
-    const share = 1 - Math.exp(-seconds / kSettleSeconds), tip = new Vector3(...tool.tip);
+    const share = 1 - Math.exp(-seconds / kSettleSeconds),
+      tip = new Vector3(...tool.tip);
     if (!this.isAlong) {
       const step = tip.sub(this.target).multiplyScalar(share);
       this.target.add(step);
       this.camera.position.add(step);
       return;
     }
-    const eye = new Vector3(0, 0, kBehind).applyQuaternion(new Quaternion(...tool.orientation)).add(tip);
+    const eye = new Vector3(0, 0, kBehind)
+      .applyQuaternion(new Quaternion(...tool.orientation))
+      .add(tip);
     eye.y += kAbove;
     this.target.lerp(tip, share);
     this.camera.position.lerp(eye, share);
@@ -82,10 +112,14 @@ export class Pane {
 
   // Turns the view by so many radians.
   turn(yaw: number, pitch: number): void {
-    const offset = this.camera.position.clone().sub(this.target), length = offset.length();
-    const to = Math.asin(Math.max(-1, Math.min(1, offset.y / length))) + pitch, around = Math.atan2(offset.x, offset.z) + yaw;
+    const offset = this.camera.position.clone().sub(this.target),
+      length = offset.length();
+    const to = Math.asin(Math.max(-1, Math.min(1, offset.y / length))) + pitch,
+      around = Math.atan2(offset.x, offset.z) + yaw;
     const up = Math.max(-1.5, Math.min(1.5, to));
-    offset.set(Math.sin(around) * Math.cos(up), Math.sin(up), Math.cos(around) * Math.cos(up)).multiplyScalar(length);
+    offset
+      .set(Math.sin(around) * Math.cos(up), Math.sin(up), Math.cos(around) * Math.cos(up))
+      .multiplyScalar(length);
     this.camera.position.copy(this.target).add(offset);
   }
   zoom(factor: number): void {

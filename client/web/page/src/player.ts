@@ -6,7 +6,7 @@ import { kDamaged, type Item, type Recording } from './recording';
 import type { Replica } from './replica';
 
 export const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
-const kAheadItems = 400, kParticipantsField = 19;
+const kAheadItems = 400;
 
 export class Player {
   tick: number;
@@ -28,7 +28,11 @@ export class Player {
   private wanted: number | null = null;
   private lastMs = performance.now();
 
-  constructor(readonly recording: Recording, private readonly replica: Replica, private readonly onChange: () => void) {
+  constructor(
+    readonly recording: Recording,
+    private readonly replica: Replica,
+    private readonly onChange: () => void,
+  ) {
     this.tick = recording.firstTick;
   }
 
@@ -56,7 +60,8 @@ export class Player {
     if (this.isSeeking) return;
     this.isSeeking = true;
     while (this.wanted !== null) {
-      const to: number = this.wanted, begin = performance.now();
+      const to: number = this.wanted,
+        begin = performance.now();
       this.wanted = null;
       this.generation++;
       this.stream = null;
@@ -78,7 +83,8 @@ export class Player {
     this.onChange();
     void this.loadFine();
   }
-  // After the first picture, which it is not needed for. What is wrong with it costs the finer surface alone.
+  // After the first picture, which it is not needed for. What is wrong with it costs the finer
+  // surface alone.
   private async loadFine(): Promise<void> {
     if (this.hasFine) return;
     this.hasFine = true;
@@ -97,9 +103,12 @@ export class Player {
     if (this.isSeeking || this.stream === null) return;
     void this.readAhead();
     if (!this.isPlaying) return;
-    const before = this.tick, next = before + passed * this.speed;
+    const before = this.tick,
+      next = before + passed * this.speed;
     // The clock waits for frames that have not been loaded yet.
-    const loaded = this.hasEnded ? this.recording.lastTick : this.waiting.at(-1)?.tick ?? this.tick;
+    const loaded = this.hasEnded
+      ? this.recording.lastTick
+      : (this.waiting.at(-1)?.tick ?? this.tick);
     this.tick = Math.min(next, Math.max(this.tick, loaded));
     let due = 0;
     while (due < this.waiting.length && (this.waiting[due]?.tick ?? Infinity) <= this.tick) due++;
@@ -108,13 +117,14 @@ export class Player {
     } catch (error) {
       this.fail(error);
     }
-    if (this.range && before < this.range[1] && this.tick >= this.range[1]) void this.seek(this.range[0]);
+    if (this.range && before < this.range[1] && this.tick >= this.range[1])
+      void this.seek(this.range[0]);
     else if (this.tick >= this.recording.lastTick) this.pause();
   }
 
   private feed(item: Item): void {
-    if (item.field === kParticipantsField) this.people = fromBinary(ParticipantsSchema, item.data);
-    if (item.field !== 0) this.replica.receiveBare(item.field, item.data, performance.now());
+    if (item.name === 'participants') this.people = fromBinary(ParticipantsSchema, item.data);
+    if (item.name) this.replica.receiveBare(item.name, item.data, performance.now());
     this.replica.takeOutbox(); // a recording answers nobody
     this.onItem(item);
   }
@@ -123,7 +133,11 @@ export class Player {
     this.isReading = true;
     const { generation, stream } = this;
     try {
-      while (stream !== null && generation === this.generation && this.waiting.length < kAheadItems) {
+      while (
+        stream !== null &&
+        generation === this.generation &&
+        this.waiting.length < kAheadItems
+      ) {
         const next = await stream.next();
         if (generation !== this.generation) break;
         if (next.done) {
@@ -139,7 +153,8 @@ export class Player {
   }
   private fail(error: unknown): void {
     this.isPlaying = false;
-    this.fault = error instanceof Error && / recording/i.test(error.message) ? error.message : kDamaged;
+    this.fault =
+      error instanceof Error && / recording/i.test(error.message) ? error.message : kDamaged;
     this.stream = null;
     this.onChange();
   }

@@ -1,83 +1,90 @@
 // The picture: geometry of the module, drawn with the native client's shaders.
 
 import {
-  BufferAttribute, BufferGeometry, ConstantAlphaFactor, CustomBlending, Data3DTexture, DynamicDrawUsage, GLSL3, Group,
-  LinearFilter, Matrix4, Mesh, NormalBlending, OneMinusConstantAlphaFactor, Quaternion,
-  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type Intersection, type IUniform, type PerspectiveCamera,
+  BufferAttribute,
+  BufferGeometry,
+  Data3DTexture,
+  DynamicDrawUsage,
+  GLSL3,
+  LinearFilter,
+  Matrix4,
+  Mesh,
+  RawShaderMaterial,
+  Raycaster,
+  RepeatWrapping,
+  Scene,
+  Vector2,
+  Vector3,
+  Vector4,
+  WebGLRenderer,
+  type Intersection,
+  type IUniform,
+  type PerspectiveCamera,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
+import { lightingSource, organFragmentSource, organVertexSource } from './gen/shaders';
 import { Field } from './field';
 import { FineLayer } from './fine';
+import { Instruments, kShadows, type Guide } from './instruments';
 import { Pane, partsOf, type Part, type ViewCount } from './pane';
-import { Overlay, type Mesh as PlainMesh, type Pointer, type Replica, type Shape, type Tool, type Vec3 } from './replica';
+import { Overlay, type Replica, type Vec3 } from './replica';
 
 // A place of the surface: shares of the corners of a triangle, which are numbers of vertices.
-export interface SurfacePlace { corners: Vec3; shares: Vec3 }
-export interface Label { text: string; colour: number }
-// The picture asks this for shapes and names, which it does not know.
-export interface Guide {
-  shapeOf(slot: number): Shape; // of a tool
-  labelOf(tool: Tool): Label;
-  pointerLabel(participant: number): string;
+export interface SurfacePlace {
+  corners: Vec3;
+  shares: Vec3;
 }
-
-const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
-const kApart = 0.001; // m: hand and tool farther apart are joined by a line
-const kLessonPoint = -1, kLessonColour = 0xf0e442; // the point to follow, among who points
-const kPointerLength = 0.035, kNoise = 64;
-const kHazePerMiddle = 0.55, kScopeHaze: [number, number] = [0.05, 4]; // as in the native picture
-const kPitch = 0.42; // of the views at the start: from the front, a side, the back, and above
-const kStarts: [number, number][] = [[0, kPitch], [Math.PI / 2, kPitch], [Math.PI, kPitch], [0, 1.45]];
-const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
-
-interface DrawnTool {
-  group: Group;
-  upper: Group | null;
-  lower: Group | null;
-  opening: number;
-  dim: IUniform<number>;
-  arrows: Mesh[];
-  arrowGroup: Group;
-  handLine: Mesh[];
-  handGroup: Group;
-  label: HTMLElement;
-  shape: string; // its figures, to see a change
-}
-
-interface DrawnPointer { group: Group; label: HTMLElement }
+const kNoise = 64;
+const kHazePerMiddle = 0.55,
+  kScopeHaze: [number, number] = [0.05, 4]; // the native picture's
+const kPitch = 0.42; // views begin at the front, a side, the back, and above
+const kStarts: [number, number][] = [
+  [0, kPitch],
+  [Math.PI / 2, kPitch],
+  [Math.PI, kPitch],
+  [0, 1.45],
+];
+const kSlowMs = 45,
+  kJudged = 40; // pictures, before quality is lowered
 
 export class Picture {
   overlay: Overlay = Overlay.Regions;
   showsArrows = true;
-  onLetGo: (view: number) => void = () => undefined; // the person moves a view, so that it follows nobody
-  onTurn: () => void = () => undefined; // likewise of the first, whatever it follows
+  // The person moves a view, so that it follows nobody.
+  onLetGo: (view: number) => void = () => undefined;
+  onTurn: () => void = () => undefined; // the person moves the first view, whatever it follows
   onActive: (view: number) => void = () => undefined; // another one is moved from now on
   pictures = 0;
-  drawMs = 0; // of the last picture
+  drawMs = 0; // the last picture took so long
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly controls: OrbitControls;
   private readonly panes = kStarts.map(([yaw, pitch]) => new Pane(yaw, pitch));
   private count: ViewCount = 1;
-  private active = 0; // of the views: which one mouse and keys move
+  private active = 0; // the view that mouse and keys move
   private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly fine: FineLayer;
   private readonly field: Field;
   private readonly uniforms: Record<string, IUniform>;
-  private readonly tools = new Map<number, DrawnTool>();
-  private readonly pointers = new Map<number, DrawnPointer>();
-  private drawing: Mesh | null = null;
+  private readonly instruments: Instruments;
   private version = -1;
   private lastMs = 0;
   private gaps: number[] = [];
   private quality: number; // 0 best, 1 plain, 2 fewer pixels
-  private head = '';
   private width = 1;
   private height = 1;
 
-  constructor(readonly canvas: HTMLCanvasElement, private readonly labels: HTMLElement, private readonly replica: Replica, private readonly guide: Guide) {
-    const gl = canvas.getContext('webgl2', { antialias: !isSlow(), alpha: true, powerPreference: 'high-performance' });
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    labels: HTMLElement,
+    private readonly replica: Replica,
+    private readonly guide: Guide,
+  ) {
+    const gl = canvas.getContext('webgl2', {
+      antialias: !isSlow(),
+      alpha: true,
+      powerPreference: 'high-performance',
+    });
     if (!gl) throw new Error('This browser cannot draw here: it has no WebGL 2.');
     this.quality = rendersInSoftware(gl) ? 1 : 0;
     this.renderer = new WebGLRenderer({ canvas, context: gl });
@@ -92,30 +99,62 @@ export class Picture {
       this.letGo();
     });
     // Before the controls: they move the view that was touched.
-    for (const kind of ['pointerdown', 'wheel'] as const) canvas.addEventListener(kind, this.touch, true);
+    for (const kind of ['pointerdown', 'wheel'] as const)
+      canvas.addEventListener(kind, this.touch, true);
     const noise = new Data3DTexture(replica.noise(kNoise), kNoise, kNoise, kNoise);
     noise.wrapS = noise.wrapT = noise.wrapR = RepeatWrapping;
     noise.magFilter = noise.minFilter = LinearFilter;
     noise.needsUpdate = true;
     const four = (): Vector4[] => Array.from({ length: kShadows }, () => new Vector4());
     this.uniforms = {
-      clip_from_world: { value: new Matrix4() }, eye: { value: new Vector3() }, key_direction: { value: new Vector3(0, 1, 0) },
-      fill_direction: { value: new Vector3(0, 1, 0) }, haze: { value: new Vector2() }, noise: { value: noise }, shadow_count: { value: 0 },
-      shadow_tip: { value: four() }, shadow_shaft: { value: four() },
+      clip_from_world: { value: new Matrix4() },
+      eye: { value: new Vector3() },
+      key_direction: { value: new Vector3(0, 1, 0) },
+      fill_direction: { value: new Vector3(0, 1, 0) },
+      haze: { value: new Vector2() },
+      noise: { value: noise },
+      shadow_count: { value: 0 },
+      shadow_tip: { value: four() },
+      shadow_shaft: { value: four() },
     };
-    this.organ = new Mesh(new BufferGeometry(), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: organVertexSource, uniforms: this.uniforms }));
+    this.organ = new Mesh(
+      new BufferGeometry(),
+      new RawShaderMaterial({
+        glslVersion: GLSL3,
+        vertexShader: organVertexSource,
+        uniforms: this.uniforms,
+      }),
+    );
     this.organ.frustumCulled = false;
     this.fine = new FineLayer(this.uniforms);
     this.field = new Field(this.uniforms);
+    this.instruments = new Instruments(
+      this.scene,
+      this.uniforms,
+      labels,
+      replica,
+      guide,
+      this.main,
+      at => this.onCanvas(at),
+    );
     this.scene.add(this.organ, this.fine.mesh, this.field.backdrop, this.field.scopeEdge);
     this.setQuality(this.quality);
   }
 
-  get isPlain(): boolean { return this.quality > 0; }
-  // One line for people: why the fine surface, or its picture, is not drawn; empty: nothing is wrong.
-  get fineFault(): string { return this.replica.fineFault || this.fine.fault; }
-  get views(): ViewCount { return this.count; }
-  get parts(): Part[] { return this.panes.slice(0, this.count).map(pane => pane.part); }
+  get isPlain(): boolean {
+    return this.quality > 0;
+  }
+  // One line for people: why the fine surface, or its picture, is not drawn; empty: nothing is
+  // wrong.
+  get fineFault(): string {
+    return this.replica.fineFault || this.fine.fault;
+  }
+  get views(): ViewCount {
+    return this.count;
+  }
+  get parts(): Part[] {
+    return this.panes.slice(0, this.count).map(pane => pane.part);
+  }
   // How many views there are; the first is always there.
   set views(count: ViewCount) {
     this.count = count;
@@ -135,7 +174,9 @@ export class Picture {
     Object.assign(this.panes[view] ?? {}, { follows: participant, isAlong });
   }
   // A view sees with the tool in a slot, as long as it is there; null: from its own place.
-  seeWith(view: number, slot: number | null): void { Object.assign(this.panes[view] ?? {}, { seesWith: slot }); }
+  seeWith(view: number, slot: number | null): void {
+    Object.assign(this.panes[view] ?? {}, { seesWith: slot });
+  }
   // Sets the view as it was at the beginning.
   resetView(): void {
     this.letGo();
@@ -156,7 +197,8 @@ export class Picture {
   }
   // Where the first view is, m: for others, who follow it.
   view(): { eye: Vec3; target: Vec3 } {
-    const { x, y, z } = this.camera.position, to = this.main.target;
+    const { x, y, z } = this.camera.position,
+      to = this.main.target;
     return { eye: [x, y, z], target: [to.x, to.y, to.z] };
   }
   look(eye: Vec3, target: Vec3): void {
@@ -165,34 +207,51 @@ export class Picture {
     this.main.target.set(...target);
   }
   // Where each view looks from, m.
-  places(): Vec3[] { return this.panes.slice(0, this.count).map(({ camera: { position: p } }) => [p.x, p.y, p.z]); }
-  private get main(): Pane { return this.panes[0]!; }
-  private get moved(): Pane { return this.panes[this.active] ?? this.main; }
-  private get camera(): PerspectiveCamera { return this.main.camera; }
+  places(): Vec3[] {
+    return this.panes.slice(0, this.count).map(({ camera: { position: p } }) => [p.x, p.y, p.z]);
+  }
+  private get main(): Pane {
+    return this.panes[0]!;
+  }
+  private get moved(): Pane {
+    return this.panes[this.active] ?? this.main;
+  }
+  private get camera(): PerspectiveCamera {
+    return this.main.camera;
+  }
   private readonly touch = (event: MouseEvent): void => {
-    const rect = this.canvas.getBoundingClientRect(), x = (event.clientX - rect.left) / rect.width, y = (event.clientY - rect.top) / rect.height;
+    const rect = this.canvas.getBoundingClientRect(),
+      x = (event.clientX - rect.left) / rect.width,
+      y = (event.clientY - rect.top) / rect.height;
     const view = this.panes.findIndex((pane, i) => i < this.count && pane.has(x, y));
     if (view >= 0 && view !== this.active) this.activate(view);
   };
   dispose(): void {
-    for (const kind of ['pointerdown', 'wheel'] as const) this.canvas.removeEventListener(kind, this.touch, true);
+    for (const kind of ['pointerdown', 'wheel'] as const)
+      this.canvas.removeEventListener(kind, this.touch, true);
     this.controls.dispose();
     this.field.dispose();
     this.fine.dispose();
     this.renderer.dispose();
-    for (const drawn of [...this.tools.values(), ...this.pointers.values()]) drawn.label.remove();
+    this.instruments.dispose();
   }
 
   resize(width: number, height: number): void {
     this.width = Math.max(1, width);
     this.height = Math.max(1, height);
-    const ratio = Math.min(2, window.devicePixelRatio || 1) * (this.quality === 2 ? 0.6 : this.quality === 1 ? Math.min(1, 1 / (window.devicePixelRatio || 1)) : 1);
+    const ratio =
+      Math.min(2, window.devicePixelRatio || 1) *
+      (this.quality === 2
+        ? 0.6
+        : this.quality === 1
+          ? Math.min(1, 1 / (window.devicePixelRatio || 1))
+          : 1);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(this.width, this.height, false);
     partsOf(this.count, this.height > this.width).forEach((part, i) => {
       const pane = this.panes[i]!;
       pane.part = part;
-      pane.camera.aspect = this.width * part[2] / (this.height * part[3]);
+      pane.camera.aspect = (this.width * part[2]) / (this.height * part[3]);
       pane.camera.updateProjectionMatrix();
     });
   }
@@ -201,58 +260,74 @@ export class Picture {
   draw(nowMs: number): boolean {
     const begin = performance.now();
     const seconds = Math.min(0.25, Math.max(0.001, (nowMs - this.lastMs) / 1000));
-    if (!this.replica.update(nowMs, [100_000, 16_000, 8_000][this.quality] ?? 8_000, this.overlay)) return false;
+    if (!this.replica.update(nowMs, [100_000, 16_000, 8_000][this.quality] ?? 8_000, this.overlay))
+      return false;
     this.judge(nowMs - this.lastMs);
     this.lastMs = nowMs;
     if (this.replica.geometryVersion !== this.version) this.loadGeometry();
     this.loadPositions();
-    const tools = this.replica.tools(), shown = this.panes.slice(0, this.count);
+    const tools = this.replica.tools(),
+      shown = this.panes.slice(0, this.count);
     for (const pane of shown) {
       if (!pane.isFramed) this.frame(pane);
       pane.follow(tools, seconds);
       pane.camera.lookAt(pane.target);
       const lender = tools.find(tool => tool.slot === pane.seesWith);
-      pane.lookThrough(lender ? this.replica.lens(lender.slot, this.guide.shapeOf(lender.slot)) : null);
+      pane.lookThrough(
+        lender ? this.replica.lens(lender.slot, this.guide.shapeOf(lender.slot)) : null,
+      );
     }
     this.controls.update();
-    this.place(tools, seconds);
-    const target = this.replica.lessonTarget();
-    this.placePointers([...this.replica.pointers(), ...(target ? [{ participant: kLessonPoint, position: target }] : [])]);
-    this.placeDrawing();
+    this.instruments.place(tools, seconds, this.showsArrows);
     this.fine.load(this.replica);
     // The fine surface takes the place of the outside.
-    this.organ.geometry.setDrawRange(this.fine.isShown ? this.replica.outerTriangles * 3 : 0, Infinity);
+    this.organ.geometry.setDrawRange(
+      this.fine.isShown ? this.replica.outerTriangles * 3 : 0,
+      Infinity,
+    );
     this.renderer.setScissorTest(this.count > 1);
     for (const [view, pane] of shown.entries()) {
       const [left, top, width, height] = pane.part;
-      const box = [left * this.width, (1 - top - height) * this.height, width * this.width, height * this.height] as const;
+      const box = [
+        left * this.width,
+        (1 - top - height) * this.height,
+        width * this.width,
+        height * this.height,
+      ] as const;
       this.renderer.setViewport(...box);
       this.renderer.setScissor(...box);
       this.light(pane);
       this.field.look(this.renderer, view, pane.drawn, pane.isEndoscope, box);
       // An endoscope is not in its own picture.
-      const own = pane.isEndoscope ? this.tools.get(pane.seesWith ?? -1)?.group : undefined;
+      const own = pane.isEndoscope ? this.instruments.groupOf(pane.seesWith) : undefined;
       if (own) own.visible = false;
       this.renderer.render(this.scene, pane.drawn);
       if (own) own.visible = true;
     }
-    this.placeLabels(tools);
+    this.instruments.placeLabels(tools);
     this.pictures++;
     this.drawMs = performance.now() - begin;
     return true;
   }
 
   // Dragging turns the view, unless it points.
-  set turns(value: boolean) { this.controls.enabled = value; }
+  set turns(value: boolean) {
+    this.controls.enabled = value;
+  }
 
-  // Returns where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
+  // Returns where a ray through a place of the canvas (0 to 1 from its upper left) meets the
+  // surface.
   pick(x: number, y: number): Vec3 | null {
     const hit = this.hit(x, y);
     return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
   }
   pickSurface(x: number, y: number): SurfacePlace | null {
-    const hit = this.hit(x, y), face = hit?.face, shares = hit?.barycoord;
-    return face && shares ? { corners: [face.a, face.b, face.c], shares: [shares.x, shares.y, shares.z] } : null;
+    const hit = this.hit(x, y),
+      face = hit?.face,
+      shares = hit?.barycoord;
+    return face && shares
+      ? { corners: [face.a, face.b, face.c], shares: [shares.x, shares.y, shares.z] }
+      : null;
   }
   // Where a place in the world lies on the canvas, in pixels of the page; null: behind the viewer.
   project(place: Vec3): [number, number] | null {
@@ -262,12 +337,18 @@ export class Picture {
   // From what project() gives, of the first view.
   private onCanvas(at: Vector3): [number, number] {
     const [left, top, width, height] = this.main.part;
-    return [(left + (at.x + 1) / 2 * width) * this.width, (top + (1 - at.y) / 2 * height) * this.height];
+    return [
+      (left + ((at.x + 1) / 2) * width) * this.width,
+      (top + ((1 - at.y) / 2) * height) * this.height,
+    ];
   }
   private hit(x: number, y: number): Intersection | undefined {
-    const ray = new Raycaster(), pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main, [u, v] = pane.inside(x, y);
+    const ray = new Raycaster(),
+      pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main,
+      [u, v] = pane.inside(x, y);
     ray.setFromCamera(new Vector2(u * 2 - 1, 1 - v * 2), pane.drawn);
-    const { geometry } = this.organ, { start, count } = geometry.drawRange;
+    const { geometry } = this.organ,
+      { start, count } = geometry.drawRange;
     geometry.computeBoundingSphere();
     geometry.setDrawRange(0, Infinity); // the mesh's surface is what is felt and drawn on
     const hit = ray.intersectObject(this.organ, false)[0];
@@ -277,10 +358,13 @@ export class Picture {
 
   private setQuality(quality: number): void {
     this.quality = quality;
-    this.head = 'precision highp float;\nprecision highp sampler3D;\n' + (quality === 0 ? '#define FINE 1\n' : '');
-    this.organ.material.fragmentShader = this.head + lightingSource + organFragmentSource;
+    const head =
+      'precision highp float;\nprecision highp sampler3D;\n' +
+      (quality === 0 ? '#define FINE 1\n' : '');
+    this.organ.material.fragmentShader = head + lightingSource + organFragmentSource;
     this.organ.material.needsUpdate = true;
-    this.fine.setHead(this.head);
+    this.fine.setHead(head);
+    this.instruments.head = head;
     this.resize(this.width, this.height);
   }
   // Lowers the quality by itself when pictures take long.
@@ -294,7 +378,10 @@ export class Picture {
   }
 
   private box(): [Vector3, Vector3] {
-    const p = this.replica.rest(), low = new Vector3(1e9, 1e9, 1e9), high = new Vector3(-1e9, -1e9, -1e9), at = new Vector3();
+    const p = this.replica.rest(),
+      low = new Vector3(1e9, 1e9, 1e9),
+      high = new Vector3(-1e9, -1e9, -1e9),
+      at = new Vector3();
     for (let i = 0; i + 3 < p.length; i += 4) {
       at.set(p[i] ?? 0, p[i + 1] ?? 0, p[i + 2] ?? 0);
       low.min(at);
@@ -308,9 +395,14 @@ export class Picture {
   }
 
   private loadGeometry(): void {
-    const r = this.replica, n = r.vertexCount, g = this.organ.geometry;
+    const r = this.replica,
+      n = r.vertexCount,
+      g = this.organ.geometry;
     g.dispose();
-    for (const [name, size] of [['position', 3], ['normal', 3]] as const)
+    for (const [name, size] of [
+      ['position', 3],
+      ['normal', 3],
+    ] as const)
       g.setAttribute(name, dynamic(new BufferAttribute(new Float32Array(n * size), size)));
     g.setAttribute('lip', dynamic(new BufferAttribute(new Int8Array(n * 4), 4, true)));
     g.setAttribute('rest', new BufferAttribute(r.rest().slice(), 4));
@@ -321,161 +413,13 @@ export class Picture {
   }
   private loadPositions(): void {
     const g = this.organ.geometry;
-    for (const [name, values] of [['position', this.replica.positions()], ['normal', this.replica.normals()], ['lip', this.replica.lips()], ['overlay', this.replica.overlay()]] as const) {
+    for (const [name, values] of [
+      ['position', this.replica.positions()],
+      ['normal', this.replica.normals()],
+      ['lip', this.replica.lips()],
+      ['overlay', this.replica.overlay()],
+    ] as const) {
       const attribute = g.getAttribute(name) as BufferAttribute;
-      attribute.array.set(values);
-      attribute.needsUpdate = true;
-    }
-  }
-
-  private toolMaterial(object: Mesh<BufferGeometry, RawShaderMaterial>, dim: IUniform<number>, glow: number): void {
-    object.material = new RawShaderMaterial({
-      glslVersion: GLSL3, vertexShader: toolVertexSource, fragmentShader: this.head + lightingSource + toolFragmentSource,
-      uniforms: { ...this.uniforms, world_from_model: { value: object.matrixWorld }, glow: { value: glow }, dim },
-    });
-  }
-  private meshOf(plain: PlainMesh, dim: IUniform<number>, glow = 0): Mesh<BufferGeometry, RawShaderMaterial> {
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(plain.positions, 3));
-    geometry.setAttribute('normal', new BufferAttribute(plain.normals, 3));
-    geometry.setAttribute('material', new BufferAttribute(plain.materials, 4, true));
-    const mesh = new Mesh<BufferGeometry, RawShaderMaterial>(geometry);
-    mesh.frustumCulled = false;
-    this.toolMaterial(mesh, dim, glow);
-    return mesh;
-  }
-
-  // Two meshes: one that shows faintly through tissue, one where nothing is before it.
-  private arrowGroup(arrow: PlainMesh): { group: Group; meshes: Mesh[] } {
-    const through = this.meshOf(arrow, { value: 1 }, 1), before = this.meshOf(arrow, { value: 1 }, 0.55), group = new Group();
-    Object.assign(through.material, { depthTest: false, depthWrite: false, transparent: true, blending: CustomBlending, blendSrc: ConstantAlphaFactor, blendDst: OneMinusConstantAlphaFactor, blendAlpha: 0.35 });
-    before.material.blending = NormalBlending;
-    before.material.transparent = true; // after what shows through
-    through.renderOrder = 1;
-    before.renderOrder = 2;
-    group.add(through, before);
-    return { group, meshes: [through, before] };
-  }
-
-  private drawnTool(tool: Tool): DrawnTool {
-    const shape = this.guide.shapeOf(tool.slot), text = JSON.stringify(shape), known = this.tools.get(tool.slot);
-    if (known && known.shape === text) return known;
-    if (known) {
-      this.scene.remove(known.group, known.arrowGroup, known.handGroup);
-      known.label.remove();
-    }
-    const colour = this.replica.slotColour(tool.slot >> 1), dim: IUniform<number> = { value: 1 }, group = new Group();
-    const { body, jaw, hinge } = this.replica.makeTool(shape, colour);
-    group.add(this.meshOf(body, dim));
-    const made: DrawnTool = { group, upper: null, lower: null, opening: 0, dim, arrows: [], arrowGroup: new Group(), handLine: [], handGroup: new Group(), label: document.createElement('div'), shape: text };
-    if (jaw) {
-      const hung = (isLower: boolean): Group => {
-        const turned = new Group(), pivot = new Group(), mesh = this.meshOf(jaw, dim);
-        turned.rotation.z = isLower ? Math.PI : 0;
-        pivot.position.z = hinge;
-        mesh.position.z = -hinge;
-        pivot.add(mesh);
-        turned.add(pivot);
-        group.add(turned);
-        return pivot;
-      };
-      made.upper = hung(false);
-      made.lower = hung(true);
-    }
-    const arrow = this.arrowGroup(this.replica.makeArrow(0.02, 0.0016, colour));
-    made.arrows = arrow.meshes;
-    made.arrowGroup = arrow.group;
-    const line = this.arrowGroup(this.replica.makeHandLine(0.02, colour));
-    made.handLine = line.meshes;
-    made.handGroup = line.group;
-    made.label.className = 'label';
-    this.labels.append(made.label);
-    this.scene.add(group, made.arrowGroup, made.handGroup);
-    this.tools.set(tool.slot, made);
-    return made;
-  }
-
-  private place(tools: Tool[], seconds: number): void {
-    const shown = new Set(tools.map(t => t.slot));
-    for (const [slot, drawn] of this.tools) drawn.group.visible = drawn.arrowGroup.visible = drawn.handGroup.visible = shown.has(slot);
-    const tips = this.uniforms['shadow_tip']?.value as Vector4[], shafts = this.uniforms['shadow_shaft']?.value as Vector4[];
-    this.uniforms['shadow_count']!.value = Math.min(kShadows, tools.length);
-    tools.forEach((tool, i) => {
-      const drawn = this.drawnTool(tool), shape = this.guide.shapeOf(tool.slot);
-      drawn.group.position.set(...tool.tip);
-      drawn.group.quaternion.set(...tool.orientation);
-      drawn.dim.value = tool.isSilent ? 0.45 : 1;
-      const motion = this.replica.jawMotion(shape.form, tool.verb, tool.hasClaim);
-      drawn.opening += (motion.opening - drawn.opening) * (1 - Math.exp(-seconds / motion.seconds));
-      if (drawn.upper) drawn.upper.rotation.x = drawn.opening;
-      if (drawn.lower) drawn.lower.rotation.x = drawn.opening;
-      this.placeArrow(drawn, tool);
-      this.placeHandLine(drawn, tool);
-      if (i >= kShadows) return;
-      const along = new Vector3(0, 0, 1).applyQuaternion(drawn.group.quaternion);
-      tips[i]?.set(...tool.tip, shape.radiusM + 0.5 * shape.halfWidthM);
-      shafts[i]?.set(along.x, along.y, along.z, shape.lengthM);
-    });
-  }
-  private placeArrow(drawn: DrawnTool, tool: Tool): void {
-    const force = new Vector3(...tool.forceN), newton = force.length();
-    drawn.arrowGroup.visible = this.showsArrows && newton >= kLeastNewton;
-    if (!drawn.arrowGroup.visible) return;
-    const made = this.replica.makeArrow(Math.min(newton * kMetresPerNewton, kMostArrow), 0.0016, this.replica.slotColour(tool.slot >> 1));
-    reshape(drawn.arrows, made);
-    drawn.arrowGroup.position.set(...tool.tip);
-    drawn.arrowGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), force.normalize()));
-  }
-
-  private placeHandLine(drawn: DrawnTool, tool: Tool): void {
-    const apart = new Vector3(...tool.hand).sub(new Vector3(...tool.tip)), length = apart.length();
-    drawn.handGroup.visible = length > kApart;
-    if (!drawn.handGroup.visible) return;
-    reshape(drawn.handLine, this.replica.makeHandLine(length, this.replica.slotColour(tool.slot >> 1)));
-    drawn.handGroup.position.set(...tool.tip);
-    drawn.handGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), apart.normalize()));
-  }
-
-  private pointerColour(participant: number): number { return participant === kLessonPoint ? kLessonColour : this.replica.pointerColour(participant); }
-  private placePointers(pointers: Pointer[]): void {
-    const shown = new Map(pointers.map(p => [p.participant, p]));
-    for (const [who, drawn] of this.pointers) drawn.group.visible = !(drawn.label.hidden = !shown.has(who));
-    // From above the place and from before it, as the viewer sees it.
-    const m = this.main.drawn.matrixWorld.elements, along = new Vector3(-m[8], -m[9], -m[10]).multiplyScalar(0.45).sub(new Vector3(m[4], m[5], m[6])).normalize();
-    for (const { participant, position } of pointers) {
-      let drawn = this.pointers.get(participant);
-      if (!drawn) {
-        drawn = { group: this.arrowGroup(this.replica.makeArrow(kPointerLength, 0.0022, this.pointerColour(participant))).group, label: document.createElement('div') };
-        drawn.label.className = 'label pointer';
-        this.labels.append(drawn.label);
-        this.scene.add(drawn.group);
-        this.pointers.set(participant, drawn);
-      }
-      const at = new Vector3(...position);
-      drawn.group.position.copy(at).addScaledVector(along, -kPointerLength);
-      drawn.group.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), along);
-      drawn.label.textContent = participant === kLessonPoint ? 'Your goal' : this.guide.pointerLabel(participant);
-      drawn.label.style.setProperty('--own', `#${this.pointerColour(participant).toString(16).padStart(6, '0')}`);
-      at.project(this.main.drawn);
-      drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
-    }
-  }
-
-  private placeDrawing(): void {
-    const plain = this.replica.drawing(), count = plain.positions.length / 3, known = this.drawing?.geometry.getAttribute('position');
-    if (this.drawing && known?.count !== count) {
-      this.scene.remove(this.drawing);
-      this.drawing.geometry.dispose();
-      this.drawing = null;
-    }
-    if (count === 0) return;
-    if (!this.drawing) {
-      this.drawing = this.meshOf(plain, { value: 1 }, 0.8);
-      this.scene.add(this.drawing);
-      return;
-    }
-    for (const [name, values] of [['position', plain.positions], ['normal', plain.normals]] as const) {
-      const attribute = this.drawing.geometry.getAttribute(name) as BufferAttribute;
       attribute.array.set(values);
       attribute.needsUpdate = true;
     }
@@ -485,41 +429,27 @@ export class Picture {
     const camera = pane.drawn;
     camera.updateMatrixWorld();
     this.scene.updateMatrixWorld();
-    const m = camera.matrixWorld.elements, u = this.uniforms;
+    const m = camera.matrixWorld.elements,
+      u = this.uniforms;
     const direction = (right: number, up: number, back: number): Vector3 =>
-      new Vector3(m[0], m[1], m[2]).multiplyScalar(right).addScaledVector(new Vector3(m[4], m[5], m[6]), up)
-        .addScaledVector(new Vector3(m[8], m[9], m[10]), back).normalize();
+      new Vector3(m[0], m[1], m[2])
+        .multiplyScalar(right)
+        .addScaledVector(new Vector3(m[4], m[5], m[6]), up)
+        .addScaledVector(new Vector3(m[8], m[9], m[10]), back)
+        .normalize();
     (u['eye']!.value as Vector3).copy(camera.position);
-    (u['key_direction']!.value as Vector3).copy(pane.isEndoscope ? direction(0.05, 0.12, 1) : direction(0.42, 0.88, 0.55));
+    (u['key_direction']!.value as Vector3).copy(
+      pane.isEndoscope ? direction(0.05, 0.12, 1) : direction(0.42, 0.88, 0.55),
+    );
     (u['fill_direction']!.value as Vector3).copy(direction(-0.9, 0.15, 0.35));
     const middle = camera.position.distanceTo(pane.target);
-    (u['haze']!.value as Vector2).set(...(pane.isEndoscope ? kScopeHaze : [middle, kHazePerMiddle / middle] as const));
-    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
-  }
-
-  private placeLabels(tools: Tool[]): void {
-    const shown = new Set<number>();
-    for (const tool of tools) {
-      const drawn = this.tools.get(tool.slot);
-      if (!drawn) continue;
-      const shape = this.guide.shapeOf(tool.slot);
-      const at = new Vector3(0, 0, shape.radiusM * 7).applyQuaternion(drawn.group.quaternion).add(drawn.group.position).project(this.main.drawn);
-      if (at.z > 1 || Math.abs(at.x) > 1.05 || Math.abs(at.y) > 1.05) continue;
-      shown.add(tool.slot);
-      const { text, colour } = this.guide.labelOf(tool);
-      if (drawn.label.textContent !== text) drawn.label.textContent = text;
-      drawn.label.style.setProperty('--own', `#${colour.toString(16).padStart(6, '0')}`);
-      drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
-    }
-    for (const [slot, drawn] of this.tools) drawn.label.hidden = !shown.has(slot);
-  }
-}
-
-function reshape(meshes: Mesh[], to: PlainMesh): void {
-  for (const mesh of meshes) {
-    const position = mesh.geometry.getAttribute('position') as BufferAttribute;
-    position.array.set(to.positions);
-    position.needsUpdate = true;
+    (u['haze']!.value as Vector2).set(
+      ...(pane.isEndoscope ? kScopeHaze : ([middle, kHazePerMiddle / middle] as const)),
+    );
+    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(
+      camera.projectionMatrix,
+      camera.matrixWorldInverse,
+    );
   }
 }
 
@@ -530,7 +460,11 @@ function dynamic(attribute: BufferAttribute): BufferAttribute {
 
 // A browser says so before it makes a context, which takes long in software.
 function isSlow(): boolean {
-  return document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true }) === null;
+  return (
+    document
+      .createElement('canvas')
+      .getContext('webgl2', { failIfMajorPerformanceCaveat: true }) === null
+  );
 }
 
 function rendersInSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {

@@ -2,23 +2,60 @@
 // and comes back when the connection breaks.
 
 import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
-import { EnvelopeSchema, GoodbyeReason, LessonRequestSchema, MarkRequestSchema, PointRequestSchema, StrokeRequestSchema, TeachAction, TeachRequestSchema, Vec3Schema, ViewRequestSchema, type Envelope, type LessonAction, type MarkAction, type Participant } from './gen/proto/wire_pb';
+import {
+  EnvelopeSchema,
+  GoodbyeReason,
+  LessonRequestSchema,
+  MarkRequestSchema,
+  PointRequestSchema,
+  StrokeRequestSchema,
+  TeachAction,
+  TeachRequestSchema,
+  Vec3Schema,
+  ViewRequestSchema,
+  type Envelope,
+  type LessonAction,
+  type MarkAction,
+  type Participant,
+} from './gen/proto/wire_pb';
+import { firstNumber, numberOf, type MessageName } from './envelope';
 import type { Link } from './link';
 import type { Replica, Vec3 } from './replica';
 
 export type State = 'joining' | 'live' | 'away' | 'ended';
-export interface View { eye: Vec3; target: Vec3 } // m
+export interface View {
+  eye: Vec3;
+  target: Vec3;
+} // m
 export interface Hooks {
   // Every message that is not of the surface; `tick` of the session when it came.
   onMessage(message: Envelope, tick: number): void;
-  onChange(): void; // of `state` or `why`
+  onChange(): void; // `state` or `why` has changed
 }
 
-const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
-// A server that is busy may take long to let somebody in, and one that has just begun may not hear yet.
-const kJoinSilenceMs = 15_000, kJoinTries = 4;
-// Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
-const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36, 40, 80]);
+const kPingMs = 1000,
+  kSilenceMs = 4000,
+  kRoundTrips = 16;
+// A server that is busy may take long to let somebody in, and one that has just begun may not hear
+// yet.
+const kJoinSilenceMs = 15_000,
+  kJoinTries = 4;
+// What the replica alone reads: the page does not parse such messages.
+const kOfReplica: MessageName[] = [
+  'surfaceFrame',
+  'frameState',
+  'surfaceChange',
+  'surfaceTopology',
+  'surfaceSlice',
+  'frameStatePart',
+  'datagramProbe',
+  'hapticPatches',
+  'hapticLaw',
+  'pointEvent',
+  'drawing',
+  'fineSurfacePart',
+];
+const kNumbersOfReplica = new Set(kOfReplica.map(numberOf));
 
 export class Session {
   state: State = 'joining';
@@ -27,7 +64,7 @@ export class Session {
   bytes = 0;
   roundTripMs = 0;
   awaySince = 0;
-  lastView: View | null = null; // of who has the view to follow
+  lastView: View | null = null; // the view to follow
   onView: (view: View) => void = () => undefined;
   private keepSeconds = 0;
   private socket: WebSocket | null = null;
@@ -39,7 +76,11 @@ export class Session {
   private joinTries = 0;
   private hasLeft = false;
 
-  constructor(private readonly link: Link, private readonly replica: Replica, private readonly hooks: Hooks) {
+  constructor(
+    private readonly link: Link,
+    private readonly replica: Replica,
+    private readonly hooks: Hooks,
+  ) {
     this.connect();
     this.timer = window.setInterval(() => this.tick(), kPingMs);
     window.addEventListener('pagehide', this.leave);
@@ -48,35 +89,63 @@ export class Session {
 
   // How old the newest frame is, in ms by the server's clock; nothing while that is unknown.
   get newestAgeMs(): number | null {
-    const published = this.replica.newestServerUs, offset = this.offset;
-    return published === 0 || offset === null ? null : (performance.now() * 1000 + offset - published) / 1000;
+    const published = this.replica.newestServerUs,
+      offset = this.offset;
+    return published === 0 || offset === null
+      ? null
+      : (performance.now() * 1000 + offset - published) / 1000;
   }
-  // The same of what is shown, which follows the newest frame by a few.
+  // The same for the picture that is shown, some frames after the newest.
   get shownAgeMs(): number | null {
     const age = this.newestAgeMs;
-    return age === null ? null : age + Math.max(0, this.replica.newestTick - this.replica.shownTick);
+    return age === null
+      ? null
+      : age + Math.max(0, this.replica.newestTick - this.replica.shownTick);
   }
   // Beyond this the picture is old: half a round trip, three frames and 250 ms.
-  get oldAfterMs(): number { return this.roundTripMs / 2 + 48 + 250; }
+  get oldAfterMs(): number {
+    return this.roundTripMs / 2 + 48 + 250;
+  }
 
   // Marks the organ, or returns it; `name`: of several marks.
   mark(action: MarkAction, name: string): void {
     this.say({ case: 'markRequest', value: create(MarkRequestSchema, { action, name }) });
   }
 
-  // Shows everybody a place (m), or none any more.
+  // Shows everybody a point (m), or none any more.
   point(place: Vec3 | null): void {
-    const positionM = place === null ? {} : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
+    const positionM =
+      place === null
+        ? {}
+        : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
     this.say({ case: 'pointRequest', value: create(PointRequestSchema, positionM) });
   }
 
   // What an instructor does; `whom`: with whom, `text`: what the action needs.
   teach(action: TeachAction, whom: Participant | null = null, text = ''): void {
-    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action, text, participant: whom?.slot ?? 0, name: whom?.name ?? '' }) });
+    this.say({
+      case: 'teachRequest',
+      value: create(TeachRequestSchema, {
+        action,
+        text,
+        participant: whom?.slot ?? 0,
+        name: whom?.name ?? '',
+      }),
+    });
   }
   // One's tool and a free one of the receiver change hands, with what it holds.
   handOver(giver: Participant, tool: number, receiver: Participant): void {
-    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action: TeachAction.TEACH_HAND_OVER, participant: giver.slot, name: giver.name, tool, receiver: receiver.slot, receiverName: receiver.name }) });
+    this.say({
+      case: 'teachRequest',
+      value: create(TeachRequestSchema, {
+        action: TeachAction.TEACH_HAND_OVER,
+        participant: giver.slot,
+        name: giver.name,
+        tool,
+        receiver: receiver.slot,
+        receiverName: receiver.name,
+      }),
+    });
   }
   // Goes on in the lesson, or back to its beginning.
   lead(action: LessonAction): void {
@@ -84,16 +153,28 @@ export class Session {
   }
   // Lets simulated time go so fast, as a share of real time.
   slow(rate: number): void {
-    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action: TeachAction.TEACH_SLOW, rate }) });
+    this.say({
+      case: 'teachRequest',
+      value: create(TeachRequestSchema, { action: TeachAction.TEACH_SLOW, rate }),
+    });
   }
   // A line on the organ, or a piece of it.
   stroke(points: { triangle: number; weights: [number, number] }[]): void {
-    this.say({ case: 'strokeRequest', value: create(StrokeRequestSchema, { triangle: points.map(p => p.triangle), weight: points.flatMap(p => p.weights) }) });
+    this.say({
+      case: 'strokeRequest',
+      value: create(StrokeRequestSchema, {
+        triangle: points.map(p => p.triangle),
+        weight: points.flatMap(p => p.weights),
+      }),
+    });
   }
-  // Where this person's view is, as who has the one to follow.
+  // Where this person's view is, which others follow.
   view(eye: Vec3, target: Vec3): void {
     const place = (v: Vec3) => create(Vec3Schema, { x: v[0], y: v[1], z: v[2] });
-    this.say({ case: 'viewRequest', value: create(ViewRequestSchema, { eyeM: place(eye), targetM: place(target) }) });
+    this.say({
+      case: 'viewRequest',
+      value: create(ViewRequestSchema, { eyeM: place(eye), targetM: place(target) }),
+    });
   }
 
   leave = (): void => {
@@ -107,7 +188,10 @@ export class Session {
   };
 
   private get offset(): number | null {
-    const best = this.offsets.reduce<{ roundTrip: number; offset: number } | null>((a, b) => (a === null || b.roundTrip < a.roundTrip ? b : a), null);
+    const best = this.offsets.reduce<{ roundTrip: number; offset: number } | null>(
+      (a, b) => (a === null || b.roundTrip < a.roundTrip ? b : a),
+      null,
+    );
     return best === null ? null : best.offset;
   }
 
@@ -122,9 +206,12 @@ export class Session {
       socket.send(JSON.stringify({ code, name, role, session, token: this.token }));
     };
     socket.onmessage = event => {
-      if (socket === this.socket && event.data instanceof ArrayBuffer) this.take(new Uint8Array(event.data));
+      if (socket === this.socket && event.data instanceof ArrayBuffer)
+        this.take(new Uint8Array(event.data));
     };
-    socket.onclose = () => { if (socket === this.socket) this.lost('The connection broke.'); };
+    socket.onclose = () => {
+      if (socket === this.socket) this.lost('The connection broke.');
+    };
   }
 
   private take(bytes: Uint8Array): void {
@@ -134,7 +221,8 @@ export class Session {
     try {
       this.replica.receive(bytes, now);
       for (const answer of this.replica.takeOutbox()) this.send(answer);
-      if (!kSurfaceFields.has(fieldOf(bytes))) this.heed(fromBinary(EnvelopeSchema, bytes), now);
+      if (!kNumbersOfReplica.has(firstNumber(bytes)))
+        this.heed(fromBinary(EnvelopeSchema, bytes), now);
     } catch (error) {
       this.end(`This page cannot go on: ${error instanceof Error ? error.message : String(error)}`);
       this.socket?.close(1000);
@@ -147,7 +235,10 @@ export class Session {
       const roundTrip = now - Number(value.clientTimeUs) / 1000;
       this.roundTripMs = roundTrip;
       if (value.serverTimeUs > 0n) {
-        this.offsets.push({ roundTrip, offset: Number(value.serverTimeUs) - (now - roundTrip / 2) * 1000 });
+        this.offsets.push({
+          roundTrip,
+          offset: Number(value.serverTimeUs) - (now - roundTrip / 2) * 1000,
+        });
         if (this.offsets.length > kRoundTrips) this.offsets.shift();
       }
       return;
@@ -161,11 +252,14 @@ export class Session {
       this.ping();
     }
     if (kind === 'viewEvent' && value.eyeM && value.targetM) {
-      this.lastView = { eye: [value.eyeM.x, value.eyeM.y, value.eyeM.z], target: [value.targetM.x, value.targetM.y, value.targetM.z] };
+      this.lastView = {
+        eye: [value.eyeM.x, value.eyeM.y, value.eyeM.z],
+        target: [value.targetM.x, value.targetM.y, value.targetM.z],
+      };
       this.onView(this.lastView);
     }
     if (kind === 'goodbye') {
-      // A place that hangs from the connection before is free in a moment.
+      // A seat that hangs on the connection before is free in a moment.
       const comesBack = this.state === 'away' && value.reason === GoodbyeReason.GOODBYE_TIMEOUT;
       if (!comesBack) {
         this.refusal = value.reason;
@@ -179,7 +273,8 @@ export class Session {
     this.socket = null;
     if (this.state === 'ended') return;
     if (this.state === 'joining') {
-      if (++this.joinTries >= kJoinTries) return this.end('The server does not answer: is it running, and is the link right?');
+      if (++this.joinTries >= kJoinTries)
+        return this.end('The server does not answer: is it running, and is the link right?');
       return this.retryLater();
     }
     const now = performance.now();
@@ -203,13 +298,19 @@ export class Session {
     if (performance.now() - this.heardMs > patience && this.state !== 'ended') {
       const silent = this.socket;
       this.lost('Nothing has come for too long.');
-      silent.close(4000); // not in order: the session keeps the place
+      silent.close(4000); // not in order: the session keeps the seat
       return;
     }
     if (this.state === 'live') this.ping();
   }
   private ping(): void {
-    this.say({ case: 'ping', value: { $typeName: 'trocar.proto.Ping', clientTimeUs: BigInt(Math.round(performance.now() * 1000)) } });
+    this.say({
+      case: 'ping',
+      value: {
+        $typeName: 'trocar.proto.Ping',
+        clientTimeUs: BigInt(Math.round(performance.now() * 1000)),
+      },
+    });
   }
   private say(message: Envelope['message']): void {
     const envelope = create(EnvelopeSchema);
@@ -219,16 +320,12 @@ export class Session {
   private send(bytes: Uint8Array): void {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(new Uint8Array(bytes));
   }
-  private end(why: string): void { if (this.state !== 'ended') this.set('ended', why); }
+  private end(why: string): void {
+    if (this.state !== 'ended') this.set('ended', why);
+  }
   private set(state: State, why: string): void {
     this.state = state;
     this.why = why;
     this.hooks.onChange();
   }
-}
-
-// The number of the field with which an Envelope begins.
-function fieldOf(bytes: Uint8Array): number {
-  const first = bytes[0] ?? 0;
-  return first < 0x80 ? first >> 3 : ((first & 0x7f) | ((bytes[1] ?? 0) << 7)) >> 3;
 }
