@@ -2,10 +2,10 @@
 // come, whatever is lost on the way, and whoever else publishes. The session is a real server
 // without a simulation; the bus is one in memory, and so is the clock.
 
-#include "server/broadcast/bus_channel.h"
+#include "server/watch/bus/bus_channel.h"
 #include "tests/broadcast/session_on_bus.h"
 
-namespace trocar::broadcast {
+namespace trocar::bus {
 namespace {
 
 TEST(BusChannel, small_messages_that_wait_cost_more_than_their_content) {
@@ -450,4 +450,4 @@ TEST_F(Broadcast, who_finds_nobody_says_so) {
 }
 
 }  // namespace
-}  // namespace trocar::broadcast
+}  // namespace trocar::bus

@@ -1,11 +1,11 @@
-#include "server/web/bridge/join_request.h"
+#include "server/watch/page/join_request.h"
 
 #include <gtest/gtest.h>
 
 #include "common/secure/join_code.h"
 #include "proto/wire.pb.h"
 
-namespace trocar::bridge {
+namespace trocar::page {
 namespace {
 
 std::optional<JoinRefusal> read(const std::string& text, JoinRequest& request) {
@@ -63,4 +63,4 @@ TEST(JoinRequest, OfAPageThatComesBackIsTriedAgainWhileItsSessionIsAway) {
 }
 
 }  // namespace
-}  // namespace trocar::bridge
+}  // namespace trocar::page

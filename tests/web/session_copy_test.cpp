@@ -1,6 +1,6 @@
 // The copy of a session from which those who share a connection are given their pictures.
 
-#include "server/web/bridge/session_copy.h"
+#include "server/watch/follow/session_copy.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "proto/wire.pb.h"
-#include "server/web/bridge/server_clock.h"
+#include "server/watch/follow/server_clock.h"
 
-namespace trocar::bridge {
+namespace trocar::follow {
 namespace {
 
 using proto::Envelope;
@@ -282,4 +282,4 @@ TEST(ServerClock, takes_the_shortest_of_the_last_round_trips) {
 }
 
 }  // namespace
-}  // namespace trocar::bridge
+}  // namespace trocar::follow

@@ -64,7 +64,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   const WebOptions options;
   WebContent content;
   const secure::TlsContext tls;
-  bridge::Bridge bridge;
+  page::Bridge bridge;
   tcp::acceptor acceptor{context};
   std::unique_ptr<monitoring::FiguresServer> figures;  // null: not asked for
   access::TryLimiter key_limiter;
@@ -280,7 +280,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     cuts[id] = [below] { below->cut(); };
     const bool is_open = co_await below->accept(request);
     if (!is_open) co_return;
-    const auto watcher = std::make_shared<bridge::Watcher>(std::move(socket), bridge);
+    const auto watcher = std::make_shared<page::Watcher>(std::move(socket), bridge);
     cuts[id] = [watcher] { watcher->cut(); };
     co_await watcher->run();
   }
@@ -442,6 +442,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
 
   std::string metrics() const {
     const auto& b = bridge.counters;
+    const auto& sessions = bridge.sessions;
     monitoring::Exposition text("trocar_web_");
     const auto number = [](std::uint64_t count) { return static_cast<double>(count); };
     text.gauge("connections_open", "Connections of browsers now.", number(counters.open));
@@ -463,8 +464,8 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     text.counter("sessions_unreachable_total", "Sessions that did not answer.",
                  number(b.unreachable));
     text.gauge("carriers", "Connections to sessions that many share, now.", number(b.carriers));
-    text.counter("session_messages_total", "Messages from sessions.", number(b.session_messages));
-    text.counter("session_bytes_total", "Bytes of these.", number(b.session_bytes));
+    text.counter("session_messages_total", "Messages from sessions.", number(sessions.messages));
+    text.counter("session_bytes_total", "Bytes of these.", number(sessions.bytes));
     text.counter("frames_skipped_total", "Frames left out for those who share a connection.",
                  number(b.frames_skipped));
     text.counter("messages_down_total", "Messages to browsers.", number(b.messages_down));

@@ -18,7 +18,7 @@
 #include "common/base/result.h"
 #include "common/secure/tls.h"
 #include "server/app/web/options.h"
-#include "server/web/bridge/watcher.h"
+#include "server/watch/page/watcher.h"
 #include "server/web/site/page_files.h"
 #include "server/web/site/recordings.h"
 

@@ -29,7 +29,7 @@
 // Lesson: a course (common/lesson) looks at every frame from when somebody with a tool is there.
 // What it finds is told to all and recorded, with the answers and orders that people gave.
 //
-// Guests of a carrier (server/session/guests) are let in as anybody is; what is for everybody goes
+// Guests of a carrier (server/watch/crowd) are let in as anybody is; what is for everybody goes
 // to the carrier once instead of to each of them.
 //
 // Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects

@@ -1,0 +1,37 @@
+#pragma once
+
+// All who watch through this program share a Bridge: it knows the sessions that may be watched, the
+// carrier of each, counters, and the limit of wrong tries. Thread: that of its I/O context.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/any_io_executor.hpp>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/session/access/try_limiter.h"
+#include "server/watch/follow/sessions.h"
+#include "server/watch/page/carrier.h"
+#include "server/watch/page/page_counters.h"
+
+namespace trocar::page {
+
+class Bridge {
+ public:
+  explicit Bridge(std::vector<follow::SessionAddress> known) : sessions(std::move(known)) {}
+
+  // The connection that those who only watch share; a new one if the last has ended.
+  std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session,
+                                      const asio::any_io_executor& executor);
+
+  follow::Sessions sessions;
+  access::TryLimiter limiter;
+  PageCounters counters;
+
+ private:
+  std::map<std::string, std::weak_ptr<Carrier>> carriers_;  // by the session's name
+};
+
+}  // namespace trocar::page
