@@ -6,7 +6,7 @@
 
 #include <map>
 
-#include "server/session/replication/messages.h"
+#include "common/wire/session_messages.h"
 #include "server/watch/bus/publisher.h"
 #include "server/watch/bus/tap.h"
 #include "tests/broadcast/fake_bus.h"
@@ -91,7 +91,7 @@ struct Taker {
                      return news.ok() ? Status() : news.error();
                    },
                .lost = [this](const std::string&) { ++losses; },
-               .over = [this](replication::EndReason, const std::string& text) { over = text; }});
+               .over = [this](wire::EndReason, const std::string& text) { over = text; }});
   }
   // 0: there is no picture.
   std::uint32_t crc() const { return copy && copy->has_frame() ? copy->surface_crc() : 0; }

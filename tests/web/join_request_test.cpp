@@ -57,9 +57,9 @@ TEST(JoinRequest, AWrongCodeCountsAsATry) {
 
 TEST(JoinRequest, OfAPageThatComesBackIsTriedAgainWhileItsSessionIsAway) {
   JoinRequest request;
-  EXPECT_EQ(reason_of_absence(request), proto::GOODBYE_SERVER_CLOSING);
+  EXPECT_EQ(reason_of_absence(request), wire::EndReason::ServerClosing);
   request.return_token = Bytes(16, 1);
-  EXPECT_EQ(reason_of_absence(request), proto::GOODBYE_TIMEOUT);
+  EXPECT_EQ(reason_of_absence(request), wire::EndReason::Timeout);
 }
 
 }  // namespace

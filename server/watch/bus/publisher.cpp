@@ -4,15 +4,15 @@
 
 #include "common/base/log.h"
 #include "common/secure/digest.h"
+#include "common/wire/session_messages.h"
 #include "proto/wire.pb.h"
-#include "server/session/replication/messages.h"
 #include "server/watch/bus/piece.h"
 
 namespace trocar::bus {
 namespace {
 
 using follow::News;
-using replication::EndReason;
+using wire::EndReason;
 
 constexpr std::chrono::milliseconds kSignPeriod{500};
 constexpr std::uint64_t kTakeOverNs = 2'000'000'000, kTakerNs = 10'000'000'000;
@@ -118,7 +118,7 @@ Status Publisher::take(const proto::Envelope& message, const wire::SharedBytes& 
 void Publisher::take_over(EndReason reason, const std::string& text) {
   // A relay that is put out, or for a reason that it does not know, says nothing of the others.
   if (reason == EndReason::ServerClosing && was_active_) {
-    goodbye_ = replication::encode_goodbye(reason, text);
+    goodbye_ = wire::encode_goodbye(reason, text);
     publish({goodbye_});
   }
   next_.cancel();
@@ -131,11 +131,9 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
   if (!news) return;
   switch (*news) {
     case News::Nothing:
-      break;
     case News::Frame:
-      if (!message.has_frame_state() || !copy_->has_frame() ||
-          message.frame_state().frame() != copy_->frame())
-        break;
+      break;
+    case News::WholeFrame:
       if (published_ == copy_->frame())
         publish({framed});
       else if (channel_->waiting_bytes() <= kBusyBytes)
@@ -159,8 +157,7 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
 }
 
 void Publisher::publish_frame(const wire::SharedBytes& state) {
-  auto frame = published_ ? copy_->delta_from(*published_) : nullptr;
-  if (!frame) frame = copy_->keyframe();
+  const auto frame = copy_->frame_from(published_);
   published_ = copy_->frame();
   publish({frame, state});
 }
@@ -222,8 +219,8 @@ void Publisher::take_ask(BytesView bytes, const std::string& answer_to) {
 void Publisher::answer_ping(const std::string& answer_to, std::uint64_t client_time_us) {
   const auto now = options_.clock_ns();
   if (channel_->waiting_bytes() > kMostBytesBeforePong || !pongs_.take_if_left(1, now)) return;
-  send(answer_to, *replication::encode_pong(client_time_us, copy_->tick(),
-                                            upstream_->server_time_us(now / 1000)));
+  send(answer_to,
+       *wire::encode_pong(client_time_us, copy_->tick(), upstream_->server_time_us(now / 1000)));
 }
 
 // The picture in it is the one that the next difference is based on.
@@ -269,7 +266,7 @@ void Publisher::report() {
   std::uint64_t sum = *own_watchers_;
   for (const auto& [name, taker] : takers_) sum += taker.watchers;
   const auto watchers =
-      static_cast<std::uint32_t>(std::min(sum, std::uint64_t{replication::kMostRelayed}));
+      static_cast<std::uint32_t>(std::min(sum, std::uint64_t{wire::kMostRelayed}));
   if (reported_ == watchers) return;
   reported_ = watchers;
   reported_ns_ = now;

@@ -80,7 +80,7 @@ class Publisher final : public follow::Upstream {
 
   void take_welcome(const proto::Welcome& welcome);
   Status take(const proto::Envelope& message, const wire::SharedBytes& framed);
-  void take_over(replication::EndReason reason, const std::string& text);
+  void take_over(wire::EndReason reason, const std::string& text);
   void pass_on(const proto::Envelope& message, const wire::SharedBytes& framed);
   // `state`: the frame's FrameState; null: it has not come.
   void publish_frame(const wire::SharedBytes& state);

@@ -11,7 +11,7 @@
 namespace trocar::bus {
 namespace {
 
-using replication::EndReason;
+using wire::EndReason;
 
 constexpr std::chrono::milliseconds kPeriod{100};
 constexpr std::uint64_t kFirstPauseNs = 500'000'000, kLongestPauseNs = 4'000'000'000;
@@ -173,7 +173,7 @@ void Tap::begin(const Piece& last, BytesView whole) {
 void Tap::take_pong(BytesView whole) {
   proto::Envelope message;
   if (read_single_message(whole, message) && message.has_pong())
-    clock_.note(message.pong().client_time_us(), now() / 1000, message.pong().server_time_us());
+    clock_.add(message.pong().client_time_us(), message.pong().server_time_us(), now() / 1000);
 }
 
 void Tap::note_goodbye(BytesView whole) {

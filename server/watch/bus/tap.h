@@ -30,10 +30,10 @@
 #include <string>
 
 #include "common/base/timing.h"
+#include "common/wire/server_clock.h"
 #include "server/watch/bus/channel.h"
 #include "server/watch/bus/piece.h"
 #include "server/watch/bus/subjects.h"
-#include "server/watch/follow/server_clock.h"
 #include "server/watch/follow/upstream.h"
 
 namespace trocar::bus {
@@ -89,7 +89,7 @@ class Tap final : public follow::Upstream {
   void lose_count(const std::string& why);
   void ask_for_all();
   void ask(const proto::Envelope& question);
-  void end(replication::EndReason reason, const std::string& text);
+  void end(wire::EndReason reason, const std::string& text);
   void attend_often();
   std::uint64_t now() const { return options_.clock_ns(); }
 
@@ -100,7 +100,7 @@ class Tap final : public follow::Upstream {
   const std::uint64_t shortened_;  // thousandths by which its pauses are shorter
   asio::steady_timer next_;
   follow::UpstreamEvents events_;
-  follow::ServerClock clock_;
+  wire::ServerClock clock_;
 
   bool is_following_ = false;
   std::uint64_t publisher_ = 0, number_ = 0;  // that it follows, and of the newest that was taken

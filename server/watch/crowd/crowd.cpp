@@ -77,10 +77,10 @@ Status Crowd::take(const proto::Envelope& message, const wire::SharedBytes& fram
     case News::FinePart:  // give_all() gives it
       break;
     case News::Frame:
-      if (message.has_surface_frame())
-        acknowledge();
-      else if (copy_->has_frame() && message.frame_state().frame() == copy_->frame())
-        publish(framed);
+      acknowledge();
+      break;
+    case News::WholeFrame:
+      publish(framed);
       break;
     case News::NewSurface:
       encoder_->forget_changes();
@@ -106,10 +106,7 @@ Status Crowd::take(const proto::Envelope& message, const wire::SharedBytes& fram
 void Crowd::acknowledge() {
   if (!copy_->has_frame()) return;
   proto::Envelope envelope;
-  auto& ack = *envelope.mutable_frame_ack();
-  ack.set_frame(static_cast<std::uint32_t>(copy_->frame()));
-  ack.set_surface_crc(copy_->surface_crc());
-  if (!copy_->blood().empty()) ack.set_blood_crc(wire::blood_crc(copy_->blood()));
+  copy_->acknowledge(*envelope.mutable_frame_ack());
   options_.say_up(envelope);
 }
 

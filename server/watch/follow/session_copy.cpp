@@ -29,8 +29,9 @@ Result<News> SessionCopy::take(const proto::Envelope& message, const wire::Share
     case proto::Envelope::kSurfaceFrame:
       return take_frame(message.surface_frame()) ? News::Frame : News::Nothing;
     case proto::Envelope::kFrameState:
+      if (!has_frame() || message.frame_state().frame() != current_->frame) return News::Nothing;
       state_ = framed;
-      return News::Frame;
+      return News::WholeFrame;
     case proto::Envelope::kParticipants:
       participants_ = framed;
       return News::Event;
@@ -77,6 +78,12 @@ bool SessionCopy::needs_keyframe() {
   if (!wants_keyframe_ || has_asked_) return false;
   has_asked_ = true;
   return true;
+}
+
+void SessionCopy::acknowledge(proto::FrameAck& ack) const {
+  ack.set_frame(static_cast<std::uint32_t>(current_->frame));
+  ack.set_surface_crc(current_->surface_crc);
+  if (!current_->blood.empty()) ack.set_blood_crc(wire::blood_crc(current_->blood));
 }
 
 void SessionCopy::lose_count() {
@@ -199,6 +206,11 @@ wire::SharedBytes SessionCopy::keyframe() {
   wire::encode_keyframe(current_->surface, payload);
   keyframe_ = wrap(nullptr, payload);
   return keyframe_;
+}
+
+wire::SharedBytes SessionCopy::frame_from(std::optional<Frame> base) {
+  auto message = base ? delta_from(*base) : nullptr;
+  return message ? message : keyframe();
 }
 
 wire::SharedBytes SessionCopy::delta_from(Frame base) {

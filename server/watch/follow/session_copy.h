@@ -24,6 +24,7 @@ namespace trocar::proto {
 class Drawing;
 class Envelope;
 class FineSurfacePart;
+class FrameAck;
 class SurfaceChange;
 class SurfaceFrame;
 class SurfaceTopology;
@@ -35,6 +36,7 @@ namespace trocar::follow {
 enum class News {
   Nothing,
   Frame,       // there is another one to give
+  WholeFrame,  // the state of the newest one has come, too
   Event,       // it goes to everybody, in order
   Fleeting,    // likewise, unless too much waits already
   NewSurface,  // likewise, and no frame before it is of use any more
@@ -61,11 +63,15 @@ class SessionCopy {
   std::uint64_t server_time_us() const { return current_->server_time_us; }
   std::uint32_t surface_crc() const { return current_->surface_crc; }
   const wire::QuantisedSurface& surface() const { return current_->surface; }
+  // Says that the newest frame is here whole.
+  void acknowledge(proto::FrameAck& ack) const;
   // Empty where the session does not bleed.
   const wire::BloodLevels& blood() const { return current_->blood; }
   // The session's last, once it has said that.
   std::optional<Frame> last_frame() const { return last_frame_; }
   wire::SharedBytes keyframe();
+  // The newest frame as a difference from `base`, or whole where there is no way from that.
+  wire::SharedBytes frame_from(std::optional<Frame> base);
   // Null: `base` is not kept, or it is of another surface.
   wire::SharedBytes delta_from(Frame base);
   // FrameState; null: it has not come yet.

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "common/wire/framing.h"
-#include "server/session/replication/validation.h"
+#include "common/wire/session_messages.h"
 
 namespace trocar::proto {
 class Envelope;
@@ -23,7 +23,7 @@ struct UpstreamEvents {
   // An error ends the connection, which is then made again.
   std::function<Status(const proto::Envelope&, const wire::SharedBytes& framed)> message;
   std::function<void(const std::string& why)> lost;
-  std::function<void(replication::EndReason reason, const std::string& text)> over;
+  std::function<void(wire::EndReason reason, const std::string& text)> over;
 };
 
 class Upstream {

@@ -1,12 +1,10 @@
 #include "server/watch/page/carrier.h"
 
-#include <boost/asio/detached.hpp>
-
 #include "common/base/log.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
 #include "common/base/spawn.h"
-#include "common/base/timing.h"
+#include "common/wire/session_messages.h"
 #include "proto/wire.pb.h"
 #include "server/watch/page/page_messages.h"
 
@@ -15,8 +13,6 @@ namespace {
 
 using follow::News;
 
-constexpr std::size_t kMostUpwardBytes = 256 * 1024;
-constexpr std::chrono::milliseconds kPingInterval{1000};
 constexpr auto kNever = asio::steady_timer::time_point::max();
 
 }  // namespace
@@ -27,38 +23,30 @@ Carrier::Carrier(asio::any_io_executor executor, follow::Sessions& sessions, Pag
       sessions_(sessions),
       counters_(counters),
       session_(std::move(session)),
-      link_(executor, sessions),
-      changed_(executor, kNever),
-      has_mail_(executor, kNever),
-      next_ping_(executor) {}
+      conversation_(std::move(executor), sessions, {},
+                    [this](const auto& message, const auto& body) { return take(message, body); }),
+      changed_(executor_, kNever) {}
 
 Carrier::~Carrier() = default;
 
 void Carrier::start() {
-  spawn(run());
-}
-
-void Carrier::spawn(asio::awaitable<void> work) {
   const auto self = shared_from_this();
-  trocar::spawn(executor_, std::move(work),
-                [self](std::exception_ptr failure) { rethrow(failure); });
+  spawn(executor_, run(), [self](std::exception_ptr failure) { rethrow(failure); });
 }
 
 // Coroutines here hold no temporaries across a co_await: GCC 12 miscompiles some of them otherwise.
 asio::awaitable<void> Carrier::run() {
-  const bool is_open = co_await link_.open(session_);
+  const bool is_open = co_await conversation_.open(session_);
   if (!is_open || state_ == State::Ended) {
     ++counters_.unreachable;
-    why_ = link_.why();
+    why_ = conversation_.why();
     end();
     co_return;
   }
   state_ = State::Open;
   ++counters_.carriers;
   changed_.cancel();
-  spawn(write_all());
-  spawn(ping_often());
-  co_await read_all();
+  co_await conversation_.talk();
   --counters_.carriers;
   end();
 }
@@ -66,10 +54,8 @@ asio::awaitable<void> Carrier::run() {
 void Carrier::end() {
   if (state_ == State::Ended) return;
   state_ = State::Ended;
-  link_.cut();
+  conversation_.cut();
   changed_.cancel();
-  has_mail_.cancel();
-  next_ping_.cancel();
   for (const auto& [number, seat] : seats_) seat->lose();
 }
 
@@ -93,65 +79,17 @@ asio::awaitable<bool> Carrier::say(std::uint32_t number, BytesView envelope, boo
   guest.set_guest(number);
   guest.set_envelope(envelope.data(), envelope.size());
   guest.set_is_last(is_last);
-  while (state_ == State::Open && upward_bytes_ > kMostUpwardBytes)
-    co_await changed_.async_wait(kNoThrow);
-  if (state_ != State::Open) co_return false;
-  queue(message);
-  co_return true;
+  const bool has_room = co_await conversation_.await_room();
+  if (has_room) conversation_.say(message);
+  co_return has_room;
 }
 
 void Carrier::note_further(const proto::Welcome& welcome) {
   for (const auto& address : welcome.further_address())
-    sessions_.note_further(session_.name, link_.code(), address);
+    sessions_.note_further(session_.name, conversation_.code(), address);
 }
 
-void Carrier::queue(const proto::Envelope& message) {
-  upward_.push_back(wire::encode_envelope(message));
-  upward_bytes_ += upward_.back()->size();
-  has_mail_.cancel();
-}
-
-asio::awaitable<void> Carrier::write_all() {
-  while (state_ == State::Open) {
-    if (upward_.empty()) {
-      co_await has_mail_.async_wait(kNoThrow);
-      continue;
-    }
-    const auto next = upward_.front();
-    upward_.pop_front();
-    const BytesView bytes(*next);
-    const bool is_written = co_await link_.write(bytes);
-    upward_bytes_ -= next->size();
-    changed_.cancel();
-    if (!is_written) break;
-  }
-  end();
-}
-
-asio::awaitable<void> Carrier::ping_often() {
-  while (state_ == State::Open) {
-    // The session hears what a guest says first.
-    if (is_carrying_) {
-      proto::Envelope ping;
-      ping.mutable_ping()->set_client_time_us(monotonic_ns() / 1000);
-      queue(ping);
-    }
-    next_ping_.expires_after(kPingInterval);
-    co_await next_ping_.async_wait(kNoThrow);
-  }
-}
-
-asio::awaitable<void> Carrier::read_all() {
-  Bytes body;
-  while (state_ == State::Open) {
-    const bool is_read = co_await link_.read(body);
-    if (!is_read || !take(body)) break;
-  }
-}
-
-bool Carrier::take(const Bytes& body) {
-  proto::Envelope message;
-  if (!wire::decode_envelope(body, message).ok()) return false;
+bool Carrier::take(const proto::Envelope& message, const Bytes& body) {
   switch (message.message_case()) {
     case proto::Envelope::kGuestMessage: {
       const auto& guest = message.guest_message();
@@ -160,15 +98,12 @@ bool Carrier::take(const Bytes& body) {
         seat->second->take(bytes_of(std::string_view(guest.envelope())), guest.is_last());
       return true;
     }
-    case proto::Envelope::kPong:
-      clock_.note(message.pong().client_time_us(), monotonic_ns() / 1000,
-                  message.pong().server_time_us());
-      return true;
     case proto::Envelope::kGoodbye:
       say_goodbye(message.goodbye());
       return false;
     default:
-      if (!std::exchange(is_carrying_, true)) next_ping_.cancel();
+      is_carrying_ = true;
+      conversation_.begin_pings();
       return spread(message, wire::frame_body(body));
   }
 }
@@ -183,7 +118,7 @@ void Carrier::say_goodbye(const proto::Goodbye& goodbye) {
                        goodbye.reason() == proto::GOODBYE_TIMEOUT ||
                        goodbye.reason() == proto::GOODBYE_PROTOCOL_ERROR;
   if (is_lost && !is_old) return;
-  const auto words = encode_goodbye(goodbye.reason(), why_);
+  const auto words = wire::encode_goodbye(static_cast<wire::EndReason>(goodbye.reason()), why_);
   for (const auto& [number, seat] : seats_)
     seat->take(BytesView(*words).subspan(wire::kHeaderBytes), true);
 }
@@ -195,16 +130,15 @@ bool Carrier::spread(const proto::Envelope& message, const wire::SharedBytes& by
               printable(news.error().message, 200));
     return false;
   }
-  if (*news == News::Frame && message.has_surface_frame()) {
+  if (*news == News::Frame) {
     proto::Envelope ack;
-    ack.mutable_frame_ack()->set_frame(copy_.frame());
-    ack.mutable_frame_ack()->set_surface_crc(copy_.surface_crc());
-    queue(ack);
+    copy_.acknowledge(*ack.mutable_frame_ack());
+    conversation_.say(ack);
   }
   if (copy_.needs_keyframe()) {
     proto::Envelope request;
     request.mutable_keyframe_request();
-    queue(request);
+    conversation_.say(request);
   }
   if (*news == News::Nothing) return true;
   const bool is_view = message.has_view_event();

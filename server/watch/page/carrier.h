@@ -19,16 +19,13 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "server/watch/follow/server_clock.h"
+#include "server/watch/follow/conversation.h"
 #include "server/watch/follow/session_copy.h"
-#include "server/watch/follow/session_link.h"
-#include "server/watch/follow/sessions.h"
 #include "server/watch/page/page_counters.h"
 
 namespace trocar::proto {
@@ -65,7 +62,7 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   asio::awaitable<bool> reach();
   bool has_ended() const { return state_ == State::Ended; }
   const std::string& why() const { return why_; }
-  const secure::HalfCode& code() const { return link_.code(); }
+  const secure::HalfCode& code() const { return conversation_.code(); }
 
   // `seat` is told what comes until remove(). Returns its number.
   std::uint32_t add(Carried& seat);
@@ -77,39 +74,29 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   void note_further(const proto::Welcome& welcome);
 
   follow::SessionCopy& copy() { return copy_; }
-  const follow::ServerClock& clock() const { return clock_; }
+  const wire::ServerClock& clock() const { return conversation_.clock(); }
 
  private:
   enum class State { Reaching, Open, Ended };
 
-  void spawn(asio::awaitable<void> work);
   asio::awaitable<void> run();
-  asio::awaitable<void> read_all();
-  asio::awaitable<void> write_all();
-  asio::awaitable<void> ping_often();
-  bool take(const Bytes& body);
+  bool take(const proto::Envelope& message, const Bytes& body);
   void say_goodbye(const proto::Goodbye& goodbye);
   bool spread(const proto::Envelope& message, const wire::SharedBytes& framed);
-  void queue(const proto::Envelope& message);
   void end();
 
   asio::any_io_executor executor_;
   follow::Sessions& sessions_;
   PageCounters& counters_;
   const follow::SessionAddress session_;
-  follow::SessionLink link_;
+  follow::Conversation conversation_;
   State state_ = State::Reaching;
   bool is_carrying_ = false;  // a guest is welcome
   std::string why_;
   follow::SessionCopy copy_;
-  follow::ServerClock clock_;
   std::map<std::uint32_t, Carried*> seats_;
   std::uint32_t next_number_ = 1;
-  std::deque<wire::SharedBytes> upward_;
-  std::size_t upward_bytes_ = 0;
-  asio::steady_timer changed_;   // cancelled to wake who waits for it to be open, or for room
-  asio::steady_timer has_mail_;  // cancelled to wake the writer
-  asio::steady_timer next_ping_;
+  asio::steady_timer changed_;  // cancelled to wake who waits for it to be open
 };
 
 }  // namespace trocar::page

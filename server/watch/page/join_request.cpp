@@ -1,8 +1,8 @@
 #include "server/watch/page/join_request.h"
 
 #include "common/base/json.h"
-#include "common/base/version.h"
 #include "common/secure/digest.h"
+#include "common/wire/session_messages.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::page {
@@ -17,8 +17,8 @@ std::string text_at(const Json& json, const char* key) {
 
 }  // namespace
 
-int reason_of_absence(const JoinRequest& request) {
-  return request.return_token.empty() ? proto::GOODBYE_SERVER_CLOSING : proto::GOODBYE_TIMEOUT;
+wire::EndReason reason_of_absence(const JoinRequest& request) {
+  return request.return_token.empty() ? wire::EndReason::ServerClosing : wire::EndReason::Timeout;
 }
 
 std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& request) {
@@ -46,18 +46,10 @@ std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& reques
 }
 
 wire::SharedBytes hello_of(const JoinRequest& request) {
-  proto::Envelope envelope;
-  auto& hello = *envelope.mutable_hello();
-  hello.set_protocol_major(kProtocolMajor);
-  hello.set_protocol_minor(kProtocolMinor);
-  hello.set_name(request.name);
-  hello.set_role(static_cast<proto::Role>(request.role));
-  hello.set_join_secret(request.code.secret.data(), request.code.secret.size());
-  // Acknowledgements let the server skip frames by their age, for this watcher alone.
-  hello.set_acks_every_frame(true);
-  hello.set_can_return(true);
-  hello.set_return_token(request.return_token.data(), request.return_token.size());
-  return wire::encode_envelope(envelope);
+  return wire::encode_hello({.name = request.name,
+                             .role = request.role,
+                             .join_secret = request.code.secret,
+                             .return_token = request.return_token});
 }
 
 }  // namespace trocar::page

@@ -16,6 +16,7 @@
 #include "common/secure/join_code.h"
 #include "common/wire/framing.h"
 #include "common/wire/role.h"
+#include "common/wire/session_messages.h"
 
 namespace trocar::page {
 
@@ -36,9 +37,9 @@ struct JoinRefusal {
   std::string text;  // one line for the person
 };
 
-// Returns why somebody ends whose session cannot be reached, as proto::GoodbyeReason: a page that
+// Returns why somebody ends whose session cannot be reached, a page that
 // comes back tries again after a timeout, until its place is given up.
-int reason_of_absence(const JoinRequest& request);
+wire::EndReason reason_of_absence(const JoinRequest& request);
 
 // Nothing in `request` counts where a refusal comes back. Only roles that watch may join.
 std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& request);

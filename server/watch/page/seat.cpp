@@ -91,7 +91,7 @@ asio::awaitable<bool> Seat::join(const follow::SessionAddress& session) {
     ++bridge_.counters.refused;
     ++bridge_.counters.wrong_codes;
     bridge_.limiter.record_wrong_try(browser_.peer_address(), monotonic_ns());
-    refuse(proto::GOODBYE_CODE_WRONG,
+    refuse(wire::EndReason::CodeWrong,
            "the join code is not of this session: check it, or ask for a new link");
     co_return false;
   }
@@ -124,9 +124,9 @@ asio::awaitable<void> Seat::leave_carrier() {
 
 // ---- what he is told ----
 
-void Seat::refuse(int reason, const std::string& text) {
+void Seat::refuse(wire::EndReason reason, const std::string& text) {
   why_ = text;
-  tell(encode_goodbye(reason, text));
+  tell(wire::encode_goodbye(reason, text));
   is_last_ = true;
 }
 
@@ -176,6 +176,7 @@ void Seat::hear(follow::News news, const wire::SharedBytes& framed) {
       return;
     case News::LastFrame:
     case News::Frame:
+    case News::WholeFrame:
     case News::FinePart:
     case News::Nothing:
       return wake();
@@ -236,8 +237,7 @@ wire::SharedBytes Seat::next_frame() {
   }
   const auto now = monotonic_ns();
   if (!barrier_ && !pacer_.may_send(now)) return nullptr;
-  auto message = given_ ? copy.delta_from(*given_) : nullptr;
-  if (!message) message = copy.keyframe();
+  const auto message = copy.frame_from(given_);
   if (given_ && newest > *given_ + 1) bridge_.counters.frames_skipped += newest - *given_ - 1;
   given_ = newest;
   is_state_told_ = false;
@@ -293,7 +293,7 @@ Seat::Verdict Seat::heed(BytesView envelope) {
   const auto server_us = carrier_->clock().at(monotonic_ns() / 1000);
   if (server_us == 0) return Verdict::ForSession;
   if (waiting_bytes_ < kMuchWaitingBytes)
-    tell(encode_pong(message.ping().client_time_us(), carrier_->copy().tick(), server_us));
+    tell(wire::encode_pong(message.ping().client_time_us(), carrier_->copy().tick(), server_us));
   return Verdict::Done;
 }
 
@@ -304,7 +304,7 @@ asio::awaitable<void> Seat::read_up() {
     const auto message = co_await browser_.read();
     using Kind = BrowserMessage::Kind;
     if (message.kind == Kind::Closed) {
-      const auto bye = encode_bye("the page was closed");
+      const auto bye = wire::encode_bye("the page was closed");
       const BytesView body = BytesView(*bye).subspan(wire::kHeaderBytes);
       if (number_ != 0) co_await carrier_->say(number_, body, false);
       break;

@@ -67,7 +67,7 @@ class Seat final : public Carried, public std::enable_shared_from_this<Seat> {
   Verdict heed_ack(Frame frame);
   void begin();
   void tell(const wire::SharedBytes& framed);
-  void refuse(int reason, const std::string& text);
+  void refuse(wire::EndReason reason, const std::string& text);
   void wake() { news_.cancel(); }
 
   BrowserSocket& browser_;

@@ -45,7 +45,7 @@ asio::awaitable<void> Watcher::run() {
   if (has_joined && session == nullptr) {
     ++bridge_.counters.refused;
     std::string text = "the link names a session that is not here: ask for a new link";
-    co_await refuse(proto::GOODBYE_PROTOCOL_ERROR, std::move(text));
+    co_await refuse(wire::EndReason::ProtocolError, std::move(text));
   } else if (has_joined) {
     const auto address = browser_->peer_address();
     log::info("{} joins from {} as {}", printable(request_.name, 64), address,
@@ -76,7 +76,7 @@ asio::awaitable<bool> Watcher::read_join() {
     ++bridge_.counters.refused;
     std::string text =
         "too many wrong codes from here: wait " + std::to_string(wait) + " s, then try again";
-    co_await refuse(proto::GOODBYE_TOO_MANY_TRIES, std::move(text));
+    co_await refuse(wire::EndReason::TooManyTries, std::move(text));
     co_return false;
   }
   const auto refusal = read_join_request(first.bytes, request_);
@@ -87,14 +87,14 @@ asio::awaitable<bool> Watcher::read_join() {
     bridge_.limiter.record_wrong_try(address, monotonic_ns());
   }
   std::string text = refusal->text;
-  co_await refuse(
-      refusal->fault == JoinFault::Code ? proto::GOODBYE_CODE_WRONG : proto::GOODBYE_PROTOCOL_ERROR,
-      std::move(text));
+  co_await refuse(refusal->fault == JoinFault::Code ? wire::EndReason::CodeWrong
+                                                    : wire::EndReason::ProtocolError,
+                  std::move(text));
   co_return false;
 }
 
-asio::awaitable<void> Watcher::refuse(int reason, std::string text) {
-  const auto frame = encode_goodbye(reason, text);
+asio::awaitable<void> Watcher::refuse(wire::EndReason reason, std::string text) {
+  const auto frame = wire::encode_goodbye(reason, text);
   const BytesView body = BytesView(*frame).subspan(wire::kHeaderBytes);
   co_await browser_->write(body);
 }
@@ -129,7 +129,7 @@ asio::awaitable<bool> Watcher::reach_session(const follow::SessionAddress& sessi
     ++bridge_.counters.wrong_codes;
     bridge_.limiter.record_wrong_try(browser_->peer_address(), monotonic_ns());
     std::string text = "the join code is not of this session: check it, or ask for a new link";
-    co_await refuse(proto::GOODBYE_CODE_WRONG, std::move(text));
+    co_await refuse(wire::EndReason::CodeWrong, std::move(text));
     co_return false;
   }
   const auto hello = hello_of(request_);
@@ -181,7 +181,7 @@ asio::awaitable<void> Watcher::relay_up() {
   while (!is_cut_) {
     const auto message = co_await browser_->read();
     if (message.kind == BrowserMessage::Kind::Closed) {
-      const auto frame = encode_bye("the page was closed");
+      const auto frame = wire::encode_bye("the page was closed");
       const BytesView body = BytesView(*frame).subspan(wire::kHeaderBytes);
       co_await send_up(body);
       break;

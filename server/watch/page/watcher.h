@@ -44,7 +44,7 @@ class Watcher : public std::enable_shared_from_this<Watcher> {
   asio::awaitable<bool> read_join();
   asio::awaitable<void> watch_alone(const follow::SessionAddress& session);
   asio::awaitable<bool> reach_session(const follow::SessionAddress& session);
-  asio::awaitable<void> refuse(int reason, std::string text);
+  asio::awaitable<void> refuse(wire::EndReason reason, std::string text);
   asio::awaitable<void> relay_down();
   asio::awaitable<void> relay_up();
   asio::awaitable<bool> send_up(BytesView envelope);

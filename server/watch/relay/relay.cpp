@@ -3,14 +3,14 @@
 #include <algorithm>
 
 #include "common/base/log.h"
+#include "common/wire/session_messages.h"
 #include "proto/wire.pb.h"
-#include "server/session/replication/messages.h"
 
 namespace trocar::relay {
 namespace {
 
-using replication::EndReason;
 using std::chrono::milliseconds;
+using wire::EndReason;
 
 constexpr milliseconds kAttentionPeriod{50};
 constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
@@ -98,7 +98,7 @@ Status Relay::open(std::size_t topology_bytes) {
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, kSurfacesInOutbox * topology_bytes);
   tcp.max_newcomers = tcp.max_newcomers_per_address = kMostNewcomers;
   tcp.max_connections = options_.most_watchers + kMostNewcomers;
-  tcp.plain_reply = replication::encode_goodbye(
+  tcp.plain_reply = wire::encode_goodbye(
       EndReason::Version,
       "this relay speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");
   auto listening = net::TcpServer::listen(context_, tcp);

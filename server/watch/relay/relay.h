@@ -56,7 +56,7 @@ class Relay {
 
   void start();
   // Goodbye to everybody; over() follows.
-  void end(replication::EndReason reason, const std::string& text);
+  void end(wire::EndReason reason, const std::string& text);
   RelayFigures figures() const;
 
  private:
@@ -66,7 +66,7 @@ class Relay {
   Status open(std::size_t topology_bytes);
   void begin_listening();
   void attend();
-  void note_over(replication::EndReason reason, const std::string& text);
+  void note_over(wire::EndReason reason, const std::string& text);
   void fail(const Error& error);
   void await_goodbyes();
 

@@ -1,10 +1,10 @@
-#include "client/net/server_clock.h"
+#include "common/wire/server_clock.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-namespace trocar::net {
+namespace trocar::wire {
 namespace {
 
 TEST(ServerClock, TheShortestRoundTripTellsAndLaterPingsOnlySlew) {
@@ -28,5 +28,17 @@ TEST(ServerClock, TheShortestRoundTripTellsAndLaterPingsOnlySlew) {
   EXPECT_LT(clock.shortest_round_trip_us(), 35'000);
 }
 
+TEST(ServerClock, TellsTheTimeThere) {
+  ServerClock clock;
+  EXPECT_EQ(clock.at(1000), 0u);
+  clock.add(1000, 5050, 1100);  // there and back in 100: 5050 was when it was 1050 here
+  EXPECT_EQ(clock.at(2000), 6000u);
+  clock.add(2000, 6500, 4000);  // slow, and off by 500
+  EXPECT_EQ(clock.at(2000), 6000u);
+  clock.add(5000, 1, 4000);  // cannot be
+  clock.add(5000, 0, 5001);  // not known there
+  EXPECT_EQ(clock.at(2000), 6000u);
+}
+
 }  // namespace
-}  // namespace trocar::net
+}  // namespace trocar::wire

@@ -1,11 +1,12 @@
-#include "client/net/server_clock.h"
+#include "common/wire/server_clock.h"
 
 #include <algorithm>
+#include <cmath>
 
-namespace trocar::net {
+namespace trocar::wire {
 
 void ServerClock::add(std::uint64_t sent_us, std::uint64_t server_us, std::uint64_t received_us) {
-  if (received_us < sent_us) return;
+  if (received_us < sent_us || server_us == 0) return;
   const auto round_trip = static_cast<double>(received_us - sent_us);
   const double middle = static_cast<double>(sent_us) + round_trip / 2;
   const bool is_settled = samples_.size() >= kSamples;
@@ -17,9 +18,13 @@ void ServerClock::add(std::uint64_t sent_us, std::uint64_t server_us, std::uint6
   last_us_ = received_us;
 }
 
+std::uint64_t ServerClock::at(std::uint64_t now_us) const {
+  return is_known() ? now_us + static_cast<std::uint64_t>(std::llround(offset_us_)) : 0;
+}
+
 double ServerClock::shortest_round_trip_us() const {
   return samples_.empty() ? 0
                           : std::ranges::min(samples_, {}, &Sample::round_trip_us).round_trip_us;
 }
 
-}  // namespace trocar::net
+}  // namespace trocar::wire
