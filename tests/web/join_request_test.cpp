@@ -57,9 +57,9 @@ TEST(JoinRequest, AWrongCodeCountsAsATry) {
 
 TEST(JoinRequest, OfAPageThatComesBackIsTriedAgainWhileItsSessionIsAway) {
   JoinRequest request;
-  EXPECT_EQ(reason_of_absence(request), wire::EndReason::ServerClosing);
+  EXPECT_EQ(reason_to_wait(request, wire::EndReason::Full), wire::EndReason::Full);
   request.return_token = Bytes(16, 1);
-  EXPECT_EQ(reason_of_absence(request), wire::EndReason::Timeout);
+  EXPECT_EQ(reason_to_wait(request, wire::EndReason::Full), wire::EndReason::Timeout);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "server/session/access/room.h"
 #include "server/session/access/try_limiter.h"
 #include "server/watch/follow/sessions.h"
 #include "server/watch/page/carrier.h"
@@ -20,13 +21,17 @@ namespace trocar::page {
 
 class Bridge {
  public:
-  explicit Bridge(std::vector<follow::SessionAddress> known) : sessions(std::move(known)) {}
+  // `most_connections`: that browsers may have, in all and from one address. Observers leave some
+  // of them to who leads.
+  Bridge(std::vector<follow::SessionAddress> known, int most_connections,
+         int most_connections_per_address);
 
   // The connection that those who only watch share; a new one if the last has ended.
   std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session,
                                       const asio::any_io_executor& executor);
 
   follow::Sessions sessions;
+  access::Room observers;
   access::TryLimiter limiter;
   PageCounters counters;
 

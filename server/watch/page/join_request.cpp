@@ -17,8 +17,8 @@ std::string text_at(const Json& json, const char* key) {
 
 }  // namespace
 
-wire::EndReason reason_of_absence(const JoinRequest& request) {
-  return request.return_token.empty() ? wire::EndReason::ServerClosing : wire::EndReason::Timeout;
+wire::EndReason reason_to_wait(const JoinRequest& request, wire::EndReason reason) {
+  return request.return_token.empty() ? reason : wire::EndReason::Timeout;
 }
 
 std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& request) {

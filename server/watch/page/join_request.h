@@ -37,9 +37,9 @@ struct JoinRefusal {
   std::string text;  // one line for the person
 };
 
-// Returns why somebody ends whose session cannot be reached, a page that
+// Returns why somebody ends who is turned away for now: a newcomer for that `reason`; a page that
 // comes back tries again after a timeout, until its place is given up.
-wire::EndReason reason_of_absence(const JoinRequest& request);
+wire::EndReason reason_to_wait(const JoinRequest& request, wire::EndReason reason);
 
 // Nothing in `request` counts where a refusal comes back. Only roles that watch may join.
 std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& request);

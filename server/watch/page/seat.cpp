@@ -58,7 +58,8 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
       rethrow(failure);
     });
   } else if (!is_last_) {
-    refuse(reason_of_absence(request_), "the session does not answer: try again in a moment");
+    refuse(reason_to_wait(request_, wire::EndReason::ServerClosing),
+           "the session does not answer: try again in a moment");
   }
   co_await write_down();
   if (is_there) {
@@ -84,7 +85,7 @@ asio::awaitable<bool> Seat::join(const follow::SessionAddress& session) {
   const bool is_reached = co_await carrier_->reach();
   if (is_cut_) co_return false;
   if (!is_reached) {
-    refuse(reason_of_absence(request_), carrier_->why());
+    refuse(reason_to_wait(request_, wire::EndReason::ServerClosing), carrier_->why());
     co_return false;
   }
   if (carrier_->code() != request_.code.certificate) {

@@ -50,14 +50,10 @@ asio::awaitable<void> Watcher::run() {
     const auto address = browser_->peer_address();
     log::info("{} joins from {} as {}", printable(request_.name, 64), address,
               wire::name_of(request_.role));
-    if (request_.role == wire::Role::Observer) {
-      seat_ = std::make_shared<Seat>(*browser_, bridge_, request_);
-      if (is_cut_) seat_->cut();
-      co_await seat_->run(*session);
-      why_ = seat_->why();
-    } else {
+    if (request_.role == wire::Role::Observer)
+      co_await watch_with_others(*session);
+    else
       co_await watch_alone(*session);
-    }
     log::info("{} from {} has left{}{}", printable(request_.name, 64), address,
               why_.empty() ? "" : ": ", printable(why_, 200));
   }
@@ -99,6 +95,27 @@ asio::awaitable<void> Watcher::refuse(wire::EndReason reason, std::string text) 
   co_await browser_->write(body);
 }
 
+asio::awaitable<void> Watcher::watch_with_others(const follow::SessionAddress& session) {
+  auto& observers = bridge_.observers;
+  const auto address = browser_->peer_address();
+  const auto place = observers.place_for(address);
+  if (place != access::Room::Place::Free) {
+    ++bridge_.counters.refused;
+    why_ = place == access::Room::Place::AllFull
+               ? "full: all places of this page for observers are taken, come back later"
+               : "full: all places for observers from your address are taken, come back later";
+    std::string text = why_;
+    co_await refuse(reason_to_wait(request_, wire::EndReason::Full), std::move(text));
+    co_return;
+  }
+  observers.enter(address);
+  seat_ = std::make_shared<Seat>(*browser_, bridge_, request_);
+  if (is_cut_) seat_->cut();
+  co_await seat_->run(session);
+  why_ = seat_->why();
+  observers.leave(address);
+}
+
 asio::awaitable<void> Watcher::watch_alone(const follow::SessionAddress& session) {
   const bool is_there = co_await reach_session(session);
   if (!is_there) co_return;
@@ -121,7 +138,7 @@ asio::awaitable<bool> Watcher::reach_session(const follow::SessionAddress& sessi
   if (!is_open) {
     ++bridge_.counters.unreachable;
     std::string text = link_.why();
-    co_await refuse(reason_of_absence(request_), std::move(text));
+    co_await refuse(reason_to_wait(request_, wire::EndReason::ServerClosing), std::move(text));
     co_return false;
   }
   if (link_.code() != request_.code.certificate) {

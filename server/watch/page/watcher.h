@@ -42,6 +42,7 @@ class Watcher : public std::enable_shared_from_this<Watcher> {
 
  private:
   asio::awaitable<bool> read_join();
+  asio::awaitable<void> watch_with_others(const follow::SessionAddress& session);
   asio::awaitable<void> watch_alone(const follow::SessionAddress& session);
   asio::awaitable<bool> reach_session(const follow::SessionAddress& session);
   asio::awaitable<void> refuse(wire::EndReason reason, std::string text);
