@@ -23,7 +23,7 @@ void Comeback::allow(const std::string& token, std::uint32_t kept_seconds) {
 
 void Comeback::begin(std::uint64_t now_ns) {
   if (is_away()) return;
-  pause_ns_ = kFirstPauseNs;
+  pause_.restart();
   deadline_ns_ = now_ns + kept_ns_;
   away_since_ns_ = now_ns;
 }
@@ -35,10 +35,9 @@ void Comeback::end(std::uint64_t now_ns) {
   away_since_ns_ = 0;
 }
 
-std::uint64_t Comeback::next_pause_ns(std::uint64_t now_ns) {
-  const auto pause = pause_ns_;
-  pause_ns_ = std::min(pause_ns_ + pause_ns_ / 2, kLongestPauseNs);
-  return is_over(now_ns) ? 0 : std::min(pause, deadline_ns_ - now_ns);
+std::chrono::nanoseconds Comeback::next_pause(std::uint64_t now_ns) {
+  const std::uint64_t left_ns = is_over(now_ns) ? 0 : deadline_ns_ - now_ns;
+  return std::min(pause_.next(), std::chrono::nanoseconds(left_ns));
 }
 
 Comeback::Figures Comeback::figures(std::uint64_t now_ns) const {

@@ -12,12 +12,13 @@
 #include <cstdint>
 #include <string>
 
+#include "common/base/backoff.h"
+
 namespace trocar::net {
 
 class Comeback {
  public:
-  static constexpr std::uint64_t kFirstPauseNs = 200'000'000;
-  static constexpr std::uint64_t kLongestPauseNs = 2'000'000'000;
+  static constexpr std::chrono::milliseconds kFirstPause{200}, kLongestPause{2000};
 
   // Takes what Welcome says: an empty token, or no time, means that there is no way back.
   void allow(const std::string& token, std::uint32_t kept_seconds);
@@ -29,8 +30,8 @@ class Comeback {
   void end(std::uint64_t now_ns);
   bool is_over(std::uint64_t now_ns) const { return now_ns >= deadline_ns_; }
   std::uint64_t deadline_ns() const { return deadline_ns_; }
-  // Each is half as long again as the one before, and none goes beyond the deadline.
-  std::uint64_t next_pause_ns(std::uint64_t now_ns);
+  // None goes beyond the deadline.
+  std::chrono::nanoseconds next_pause(std::uint64_t now_ns);
 
   struct Figures {
     std::uint64_t returns = 0;
@@ -42,7 +43,8 @@ class Comeback {
 
  private:
   std::string token_;
-  std::uint64_t kept_ns_ = 0, pause_ns_ = 0;
+  std::uint64_t kept_ns_ = 0;
+  Backoff pause_{kFirstPause, kLongestPause, 1.5};
   std::atomic<std::uint64_t> away_since_ns_{0}, deadline_ns_{0};  // 0: not away
   std::atomic<std::uint64_t> returns_{0}, longest_ns_{0};
 };

@@ -11,7 +11,7 @@
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/secure/certificate.h"
-#include "common/wire/tool_shape.h"
+#include "common/wire/session_messages.h"
 
 namespace trocar::net {
 namespace {
@@ -123,20 +123,14 @@ asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
 }
 
 wire::SharedBytes NetSource::Session::encode_hello() const {
-  proto::Envelope envelope;
-  auto& hello = *envelope.mutable_hello();
-  hello.set_protocol_major(kProtocolMajor);
-  hello.set_protocol_minor(kProtocolMinor);
-  hello.set_name(options_.participant_name);
-  hello.set_role(static_cast<proto::Role>(options_.role));
-  hello.set_acks_every_frame(options_.acks_every_frame);
-  if (code_) hello.set_join_secret(code_->secret.data(), code_->secret.size());
-  hello.set_can_return(options_.can_return);
-  if (comeback_.is_allowed()) hello.set_return_token(comeback_.token());
-  for (const auto& shape : options_.tools) {
-    wire::write(shape, *hello.add_tool());
-  }
-  return wire::encode_envelope(envelope);
+  wire::Hello hello{.name = options_.participant_name,
+                    .role = static_cast<wire::Role>(options_.role),
+                    .tools = options_.tools,
+                    .acks_every_frame = options_.acks_every_frame,
+                    .can_return = options_.can_return};
+  if (code_) hello.join_secret = code_->secret;
+  if (comeback_.is_allowed()) hello.return_token = bytes_of(std::string_view(comeback_.token()));
+  return wire::encode_hello(hello);
 }
 
 // Coroutines here hold no temporaries across a co_await and leave the text to plain functions:
@@ -231,7 +225,7 @@ asio::awaitable<void> NetSource::Session::await_conversation_end() {
 asio::awaitable<bool> NetSource::Session::come_back() {
   why_not_ = "no answer";
   while (!is_done_ && !comeback_.is_over(monotonic_ns())) {
-    retry_timer_.expires_after(std::chrono::nanoseconds(comeback_.next_pause_ns(monotonic_ns())));
+    retry_timer_.expires_after(comeback_.next_pause(monotonic_ns()));
     co_await retry_timer_.async_wait(kNoThrow);
     if (is_done_) break;
     const auto deadline = Clock::now() + options_.return_try;
@@ -451,8 +445,8 @@ std::shared_ptr<const proto::Envelope> NetSource::Session::pop_message() {
 void NetSource::Session::note_pong(const proto::Pong& pong) {
   const auto now_us = monotonic_ns() / 1000;
   round_trip_seconds_ = static_cast<double>(now_us - pong.client_time_us()) * 1e-6;
-  if (pong.server_time_us() == 0) return;  // an older server
   clock_.add(pong.client_time_us(), pong.server_time_us(), now_us);
+  if (!clock_.is_known()) return;
   shortest_round_trip_seconds_ = clock_.shortest_round_trip_us() * 1e-6;
   server_offset_us_ = clock_.offset_us();
   has_server_clock_ = true;

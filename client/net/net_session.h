@@ -19,10 +19,10 @@
 #include "client/net/comeback.h"
 #include "client/net/datagram_path.h"
 #include "client/net/net_source.h"
-#include "client/net/server_clock.h"
 #include "common/base/spsc_queue.h"
 #include "common/secure/stream.h"
 #include "common/wire/framing.h"
+#include "common/wire/server_clock.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::net {
@@ -134,7 +134,7 @@ class NetSource::Session {
   std::uint32_t reading_sequence_ = 0;
   std::vector<wire::SharedBytes> in_flight_;
   std::unique_ptr<DatagramPath> datagrams_;  // null: the stream carries everything
-  ServerClock clock_;
+  wire::ServerClock clock_;
   bool is_connected_ = false, is_closing_ = false, is_done_ = false, is_stalled_ = false;
   bool is_barrier_ = false;  // answers must arrive from here on
   bool has_heard_ = false;   // of this connection

@@ -10,6 +10,7 @@
 #include <shared_mutex>
 #include <thread>
 
+#include "common/base/backoff.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/secure/private_files.h"
@@ -234,7 +235,7 @@ void Bus::Parts::note_error(natsConnection* connection, natsSubscription*, natsS
 }
 
 void Bus::Parts::keep(const std::stop_token& stop) {
-  auto pause = kFirstPause;
+  Backoff pause(kFirstPause, kLongestPause, 2);
   while (!stop.stop_requested()) {
     {
       std::unique_lock guard(keeper_lock);
@@ -251,14 +252,13 @@ void Bus::Parts::keep(const std::stop_token& stop) {
     if (opened) {
       if (trouble.forget()) log::info("NATS at {} is there", place.url);
       asynchronous.forget();
-      pause = kFirstPause;
+      pause.restart();
       continue;
     }
     trouble.say(opened.error().message + ": trying again");
     std::unique_lock guard(keeper_lock);
     is_gone = true;
-    has_changed.wait_for(guard, stop, pause, [] { return false; });
-    pause = std::min(2 * pause, kLongestPause);
+    has_changed.wait_for(guard, stop, pause.next(), [] { return false; });
   }
 }
 

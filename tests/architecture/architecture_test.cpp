@@ -22,17 +22,17 @@ constexpr LargeClass kLargeClasses[] = {
     {"client/replica", "Replica", 115, "each message has a method, and most of them a member"},
     {"client/web/wasm", "PageModel", 66, "each call of the page has a method"},
     {"server/app/server", "Server", 62, "what a process has one of"},
-    {"server/broadcast", "Publisher", 56, "a connection to the bus, and what goes out on it"},
-    {"server/broadcast", "Tap", 58, "being a client that comes back, once more"},
-    {"server/relay", "Crowd", 56, "who watches, and how fast"},
+    {"server/watch/bus", "Publisher", 56, "a connection to the bus, and what goes out on it"},
+    {"server/watch/bus", "Tap", 58, "being a client that comes back, once more"},
+    {"server/watch/crowd", "Crowd", 56, "who watches, and how fast"},
     {"server/session/recording", "Recorder", 57, "the file, its writer and what it keeps"},
     {"server/session/recording", "Verifier", 54, "a simulation beside the recording's"},
     {"server/session/replication", "Replicator", 85, "admission, teaching and frames in one"},
     {"server/tissue/contact", "SelfSurface", 60, "skin, wounds and what is near to what"},
     {"server/tissue/dynamics", "BlockDescent", 108, "plan, schedule and sweeps share the arrays"},
     {"server/tissue/topology", "Topology", 59, "one array per property, one method to read each"},
-    {"server/web/bridge", "Seat", 53, "a browser's place and its pace"},
-    {"server/web/bridge", "SessionCopy", 52, "each message of a session has a method"},
+    {"server/watch/page", "Seat", 53, "a browser's place and its pace"},
+    {"server/watch/follow", "SessionCopy", 54, "each message of a session has a method"},
 };
 constexpr std::size_t kLongFunctions = 39, kWideFunctions = 16;
 

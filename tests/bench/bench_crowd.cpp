@@ -31,8 +31,7 @@
 #include "common/base/version.h"
 #include "common/secure/link_file.h"
 #include "proto/wire.pb.h"
-#include "server/web/bridge/bridge.h"
-#include "server/web/bridge/session_link.h"
+#include "server/watch/follow/session_link.h"
 #include "tests/support/child_program.h"
 #include "tests/support/process_cpu.h"
 
@@ -85,7 +84,7 @@ double sum_of(const std::string& figures, const std::string& name) {
 }
 
 struct Watcher {
-  bridge::SessionAddress place;
+  follow::SessionAddress place;
   secure::JoinCode code;
   std::uint64_t server_us = 0;  // when the newest frame was published; 0: none has come
   std::uint64_t frames = 0, joins = 0;
@@ -94,9 +93,9 @@ struct Watcher {
 // One thread with its share of the watchers.
 class Share {
  public:
-  explicit Share(const std::vector<bridge::SessionAddress>& places) : bridge_(places) {}
+  explicit Share(const std::vector<follow::SessionAddress>& places) : sessions_(places) {}
 
-  void add(const bridge::SessionAddress& place, const secure::JoinCode& code) {
+  void add(const follow::SessionAddress& place, const secure::JoinCode& code) {
     watchers_.push_back(std::make_unique<Watcher>(Watcher{.place = place, .code = code}));
     asio::co_spawn(io_, watch(*watchers_.back()), rethrow);
   }
@@ -119,16 +118,16 @@ class Share {
  private:
   asio::awaitable<void> watch(Watcher& watcher) {
     asio::steady_timer pause(io_);
-    std::unique_ptr<bridge::SessionLink> link;
+    std::unique_ptr<follow::SessionLink> link;
     while (!is_over_) {
-      link = std::make_unique<bridge::SessionLink>(io_.get_executor(), bridge_);
+      link = std::make_unique<follow::SessionLink>(io_.get_executor(), sessions_);
       const bool is_open = co_await link->open(watcher.place);
-      if (is_open) co_await follow(watcher, *link);
+      if (is_open) co_await stay(watcher, *link);
       pause.expires_after(kRetry);
       co_await pause.async_wait(kNoThrow);
     }
   }
-  asio::awaitable<void> follow(Watcher& watcher, bridge::SessionLink& link) {
+  asio::awaitable<void> stay(Watcher& watcher, follow::SessionLink& link) {
     const auto hello = hello_of(watcher.code, number_++);
     const BytesView greeting(*hello);
     bool is_there = co_await link.write(greeting);
@@ -183,7 +182,7 @@ class Share {
   }
 
   static inline std::atomic<int> number_{0};
-  bridge::Bridge bridge_;
+  follow::Sessions sessions_;
   std::vector<std::unique_ptr<Watcher>> watchers_;
   std::vector<double> ages_ms_;
   std::atomic<bool> is_over_{false};
@@ -291,7 +290,7 @@ class Crowd {
 
 void run(const Options& options, int count) {
   Crowd crowd(options);
-  std::vector<bridge::SessionAddress> places;
+  std::vector<follow::SessionAddress> places;
   for (const auto port : crowd.places())
     places.push_back({"127.0.0.1:" + std::to_string(port), "127.0.0.1", port});
   const auto code = secure::read_link_file(places.front().port, "observer");

@@ -2,10 +2,10 @@
 // come, whatever is lost on the way, and whoever else publishes. The session is a real server
 // without a simulation; the bus is one in memory, and so is the clock.
 
-#include "server/broadcast/bus_channel.h"
+#include "server/watch/bus/bus_channel.h"
 #include "tests/broadcast/session_on_bus.h"
 
-namespace trocar::broadcast {
+namespace trocar::bus {
 namespace {
 
 TEST(BusChannel, small_messages_that_wait_cost_more_than_their_content) {
@@ -357,8 +357,8 @@ TEST_F(Broadcast, more_than_the_server_takes_are_never_reported) {
   }
   ASSERT_GT(first_.upstream.said.size(), 2u);
   for (const auto& said : first_.upstream.said)
-    EXPECT_LE(said.relay_report().watchers(), replication::kMostRelayed);
-  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), replication::kMostRelayed);
+    EXPECT_LE(said.relay_report().watchers(), wire::kMostRelayed);
+  EXPECT_EQ(first_.upstream.said.back().relay_report().watchers(), wire::kMostRelayed);
 }
 
 TEST_F(Broadcast, the_servers_clock_is_known_over_the_bus) {
@@ -388,7 +388,7 @@ TEST_F(Broadcast, the_end_of_the_session_is_the_end_for_all) {
   bus_.deliver();
   EXPECT_EQ(ann.copy->last_frame(), last->frame);
   EXPECT_EQ(ann.crc(), barrier->barrier().surface_crc());
-  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  first_.upstream.events.over(wire::EndReason::ServerClosing, "it is over");
   bus_.deliver();
   EXPECT_EQ(ann.over, "it is over");
 }
@@ -402,7 +402,7 @@ TEST_F(Broadcast, the_end_reaches_also_who_was_asking) {
   ann.tap.say(question);
   bus_.deliver();
   ASSERT_EQ(ann.tap.counters().asks, 2u);
-  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  first_.upstream.events.over(wire::EndReason::ServerClosing, "it is over");
   bus_.deliver();
   EXPECT_TRUE(ann.over.empty()) << "the answer may come";
   pass(1.1);
@@ -419,7 +419,7 @@ TEST_F(Broadcast, who_asks_after_the_end_has_the_last_picture_and_the_end) {
   auto& ann = come();
   EXPECT_EQ(ann.copy->last_frame(), last->frame) << "the answer says which frame is the last";
   EXPECT_TRUE(ann.over.empty());
-  first_.upstream.events.over(replication::EndReason::ServerClosing, "it is over");
+  first_.upstream.events.over(wire::EndReason::ServerClosing, "it is over");
   auto& ben = come();
   EXPECT_EQ(ben.crc(), barrier->barrier().surface_crc());
   EXPECT_EQ(ben.over, "it is over");
@@ -427,14 +427,14 @@ TEST_F(Broadcast, who_asks_after_the_end_has_the_last_picture_and_the_end) {
 
 TEST_F(Broadcast, a_relay_that_is_put_out_ends_nothing_for_others) {
   auto& ann = come();
-  first_.upstream.events.over(replication::EndReason::PutOut, "an instructor has put you out");
+  first_.upstream.events.over(wire::EndReason::PutOut, "an instructor has put you out");
   bus_.deliver();
   EXPECT_TRUE(ann.over.empty());
 }
 
 TEST_F(Broadcast, a_reason_that_nobody_knows_ends_nothing_for_others) {
   auto& ann = come();
-  first_.upstream.events.over(replication::EndReason::Unspecified, "something new");
+  first_.upstream.events.over(wire::EndReason::Unspecified, "something new");
   bus_.deliver();
   EXPECT_TRUE(ann.over.empty());
 }
@@ -450,4 +450,4 @@ TEST_F(Broadcast, who_finds_nobody_says_so) {
 }
 
 }  // namespace
-}  // namespace trocar::broadcast
+}  // namespace trocar::bus

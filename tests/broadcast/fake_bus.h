@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "proto/wire.pb.h"
-#include "server/broadcast/channel.h"
-#include "server/relay/upstream.h"
-#include "server/web/bridge/session_copy.h"
+#include "server/watch/bus/channel.h"
+#include "server/watch/follow/session_copy.h"
+#include "server/watch/follow/upstream.h"
 
-namespace trocar::broadcast {
+namespace trocar::bus {
 
 struct FakeBus {
   struct Letter {
@@ -78,17 +78,17 @@ class FakeChannel final : public Channel {
 };
 
 // A test sets `state` and reads there what was said; it outlives this.
-class FakeUpstream final : public relay::Upstream {
+class FakeUpstream final : public follow::Upstream {
  public:
   struct State {
-    relay::UpstreamEvents events;
+    follow::UpstreamEvents events;
     bool is_welcome = false;
     std::uint64_t ahead_us = 5000;  // the server's clock of ours
     std::vector<proto::Envelope> said;
   };
   explicit FakeUpstream(State& state) : state_(state) {}
 
-  void start(relay::UpstreamEvents events) override { state_.events = std::move(events); }
+  void start(follow::UpstreamEvents events) override { state_.events = std::move(events); }
   void stop() override { state_.events = {}; }
   void say(const proto::Envelope& message) override { state_.said.push_back(message); }
   std::string name() const override { return "fake"; }
@@ -103,4 +103,4 @@ class FakeUpstream final : public relay::Upstream {
   State& state_;
 };
 
-}  // namespace trocar::broadcast
+}  // namespace trocar::bus

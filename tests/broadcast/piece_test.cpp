@@ -1,12 +1,12 @@
 // Pieces are as documented, and whatever else comes is refused.
 
-#include "server/broadcast/piece.h"
+#include "server/watch/bus/piece.h"
 
 #include <gtest/gtest.h>
 
-#include "server/broadcast/subjects.h"
+#include "server/watch/bus/subjects.h"
 
-namespace trocar::broadcast {
+namespace trocar::bus {
 namespace {
 
 Bytes some_bytes(std::size_t size) {
@@ -125,4 +125,4 @@ TEST(Names, answers_go_to_subjects_for_answers_alone) {
 }
 
 }  // namespace
-}  // namespace trocar::broadcast
+}  // namespace trocar::bus

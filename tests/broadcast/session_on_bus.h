@@ -6,13 +6,13 @@
 
 #include <map>
 
-#include "server/broadcast/publisher.h"
-#include "server/broadcast/tap.h"
-#include "server/session/replication/messages.h"
+#include "common/wire/session_messages.h"
+#include "server/watch/bus/publisher.h"
+#include "server/watch/bus/tap.h"
 #include "tests/broadcast/fake_bus.h"
 #include "tests/network/session_fixture.h"
 
-namespace trocar::broadcast {
+namespace trocar::bus {
 
 using proto::Envelope;
 using testing::LiveSession;
@@ -78,7 +78,7 @@ struct Taker {
     tap.start({.welcome =
                    [this](const auto& welcome) {
                      welcomes.push_back(welcome);
-                     copy = std::make_unique<bridge::SessionCopy>();
+                     copy = std::make_unique<follow::SessionCopy>();
                    },
                .message =
                    [this](const auto& message, const auto& framed) {
@@ -91,13 +91,13 @@ struct Taker {
                      return news.ok() ? Status() : news.error();
                    },
                .lost = [this](const std::string&) { ++losses; },
-               .over = [this](replication::EndReason, const std::string& text) { over = text; }});
+               .over = [this](wire::EndReason, const std::string& text) { over = text; }});
   }
   // 0: there is no picture.
   std::uint32_t crc() const { return copy && copy->has_frame() ? copy->surface_crc() : 0; }
 
   std::vector<proto::Welcome> welcomes;
-  std::unique_ptr<bridge::SessionCopy> copy;
+  std::unique_ptr<follow::SessionCopy> copy;
   int losses = 0;
   std::string over;
   Tap tap;
@@ -176,4 +176,4 @@ class Broadcast : public ::testing::Test {
   std::vector<std::unique_ptr<Taker>> takers_;
 };
 
-}  // namespace trocar::broadcast
+}  // namespace trocar::bus

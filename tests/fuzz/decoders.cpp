@@ -27,7 +27,6 @@
 #include "proto/fine_surface.pb.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
-#include "server/broadcast/piece.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/dicom/dicom_reader.h"
@@ -46,6 +45,7 @@
 #include "server/session/replication/validation.h"
 #include "server/tissue/bleeding/blood.h"
 #include "server/tissue/world/surface_layout.h"
+#include "server/watch/bus/piece.h"
 
 namespace trocar::fuzz {
 namespace {
@@ -183,15 +183,15 @@ bool decode_handshake(BytesView bytes) {
 // Pieces of a session on a bus, each behind its length of 16 bits. Accepted: they made a whole, and
 // what is in it are Envelopes.
 bool decode_broadcast(BytesView bytes) {
-  broadcast::Assembler assembler;
+  bus::Assembler assembler;
   ByteReader reader(bytes);
   while (true) {
-    const auto piece = broadcast::read_piece(reader.read_bytes(reader.read<std::uint16_t>()));
+    const auto piece = bus::read_piece(reader.read_bytes(reader.read<std::uint16_t>()));
     if (!reader.ok()) return false;
     if (!checked(piece) || piece->pieces == 0) continue;
     const auto whole = assembler.add(*piece);
     if (!checked(whole) || !*whole) continue;
-    const auto messages = broadcast::split_messages(**whole);
+    const auto messages = bus::split_messages(**whole);
     return checked(messages) && std::ranges::all_of(*messages, [](BytesView framed) {
              return decode_envelope(framed.subspan(wire::kHeaderBytes));
            });

@@ -15,12 +15,12 @@
 #include "common/wire/surface_slices.h"
 #include "proto/fine_surface.pb.h"
 #include "proto/wire.pb.h"
-#include "server/broadcast/piece.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/reduction/reduction_file.h"
 #include "server/tissue/bleeding/blood.h"
 #include "server/tissue/world/surface_layout.h"
+#include "server/watch/bus/piece.h"
 #include "tests/dicom/dicom_sample.h"
 #include "tests/journal/session_samples.h"
 #include "tests/papers/synthetic_reduction.h"
@@ -153,7 +153,7 @@ void save_broadcast() {
   const auto second = wire::encode_envelope(ping);
   whole.insert(whole.end(), second->begin(), second->end());
   ByteWriter writer(bytes);
-  for (const auto& piece : broadcast::cut(5, 1, whole, broadcast::kPieceHeaderBytes + 10)) {
+  for (const auto& piece : bus::cut(5, 1, whole, bus::kPieceHeaderBytes + 10)) {
     writer.put(static_cast<std::uint16_t>(piece.size()));
     writer.put_bytes(piece);
   }

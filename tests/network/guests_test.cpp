@@ -229,13 +229,13 @@ struct Above final : net::ConnectionHandler {
 TEST(GuestConnections, carry_256_and_refuse_one_more) {
   Carriers carriers;
   Above above;
-  guests::GuestConnections connections(carriers);
+  crowd::GuestConnections connections(carriers);
   connections.set_handler(above);
-  for (std::uint32_t guest = 1; guest <= guests::GuestConnections::kMostGuests + 1; ++guest) {
+  for (std::uint32_t guest = 1; guest <= crowd::GuestConnections::kMostGuests + 1; ++guest) {
     const auto text = wrap(guest, make_hello("Ann", proto::ROLE_OBSERVER)).SerializeAsString();
     connections.on_message(7, bytes_of(std::string_view(text)));
   }
-  EXPECT_EQ(above.opened, guests::GuestConnections::kMostGuests);
+  EXPECT_EQ(above.opened, crowd::GuestConnections::kMostGuests);
   ASSERT_TRUE(carriers.last);
   Envelope answer, inner;
   ASSERT_TRUE(
@@ -243,7 +243,7 @@ TEST(GuestConnections, carry_256_and_refuse_one_more) {
   ASSERT_TRUE(inner.ParseFromString(answer.guest_message().envelope()));
   EXPECT_EQ(inner.goodbye().reason(), proto::GOODBYE_FULL);
   connections.on_close(7);
-  EXPECT_EQ(above.closed, guests::GuestConnections::kMostGuests + 1) << "the carrier's, too";
+  EXPECT_EQ(above.closed, crowd::GuestConnections::kMostGuests + 1) << "the carrier's, too";
 }
 
 TEST_F(Guests, each_answers_for_the_last_frame) {

@@ -300,10 +300,11 @@ TEST(Comeback, pauses_grow_to_two_seconds_and_end_with_the_time) {
   std::uint64_t last = 0;
   int tries = 0;
   while (!comeback.is_over(now)) {
-    const auto pause = comeback.next_pause_ns(now);
-    EXPECT_LE(pause, net::Comeback::kLongestPauseNs);
+    const auto next = comeback.next_pause(now);
+    const auto pause = static_cast<std::uint64_t>(next.count());
+    EXPECT_LE(next, net::Comeback::kLongestPause);
     EXPECT_TRUE(pause >= last || now + pause == comeback.deadline_ns());
-    EXPECT_TRUE(tries > 0 || pause == net::Comeback::kFirstPauseNs);
+    EXPECT_TRUE(tries > 0 || next == net::Comeback::kFirstPause);
     last = pause;
     now += pause;
     comeback.begin(now);  // a try has failed

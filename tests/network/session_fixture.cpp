@@ -190,7 +190,7 @@ LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptio
   EXPECT_TRUE(listening.ok());
   tcp_ = std::move(*listening);
   options.has_datagrams = tcp_->has_datagrams();
-  connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
+  connections_ = std::make_unique<crowd::GuestConnections>(*tcp_);
   replicator_ = std::make_unique<replication::Replicator>(*connections_, inbox, layout_,
                                                           organ_.name, 42, std::move(options));
   connections_->set_handler(*replicator_);

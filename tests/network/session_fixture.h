@@ -20,10 +20,10 @@
 #include "common/wire/surface_layout.h"
 #include "proto/wire.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
-#include "server/session/guests/guest_connections.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/replication/replicator.h"
+#include "server/watch/crowd/guest_connections.h"
 #include "tests/support/random.h"
 
 namespace trocar::testing {
@@ -119,7 +119,7 @@ class LiveSession {
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_{io_.get_executor()};
   std::unique_ptr<net::TcpServer> tcp_;
-  std::unique_ptr<guests::GuestConnections> connections_;
+  std::unique_ptr<crowd::GuestConnections> connections_;
   std::unique_ptr<replication::Replicator> replicator_;
   std::uint16_t port_ = 0;
   std::mt19937 random_{7};

@@ -2,14 +2,14 @@
 // server is a real one without a simulation; what it says to its one observer is given to the
 // crowd.
 
-#include "server/relay/crowd.h"
+#include "server/watch/crowd/crowd.h"
 
 #include <gtest/gtest.h>
 
 #include <deque>
 #include <mutex>
 
-#include "server/session/guests/guest_connections.h"
+#include "server/watch/crowd/guest_connections.h"
 #include "tests/network/session_fixture.h"
 
 namespace trocar::testing {
@@ -34,8 +34,8 @@ class RelayedSession : public ::testing::Test {
     auto listening = net::TcpServer::listen(io_, {.port = 0});
     EXPECT_TRUE(listening.ok());
     tcp_ = std::move(*listening);
-    connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
-    relay::CrowdOptions options;
+    connections_ = std::make_unique<crowd::GuestConnections>(*tcp_);
+    crowd::CrowdOptions options;
     options.secret = kSecret;
     options.most_watchers = kMostWatchers;
     options.limits.clock_ns = [this] { return clock_ns_.load(); };
@@ -44,7 +44,7 @@ class RelayedSession : public ::testing::Test {
       said_.push_back(message);
     };
     options.server_time_us = [](std::uint64_t now_us) { return now_us + 7; };
-    crowd_ = std::make_unique<relay::Crowd>(*connections_, std::move(options));
+    crowd_ = std::make_unique<crowd::Crowd>(*connections_, std::move(options));
     connections_->set_handler(*crowd_);
     thread_ = std::thread([this] { io_.run(); });
     session_.publish(10);
@@ -122,8 +122,8 @@ class RelayedSession : public ::testing::Test {
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_{io_.get_executor()};
   std::unique_ptr<net::TcpServer> tcp_;
-  std::unique_ptr<guests::GuestConnections> connections_;
-  std::unique_ptr<relay::Crowd> crowd_;
+  std::unique_ptr<crowd::GuestConnections> connections_;
+  std::unique_ptr<crowd::Crowd> crowd_;
   std::thread thread_;
 };
 

@@ -1,11 +1,11 @@
-#include "server/web/bridge/join_request.h"
+#include "server/watch/page/join_request.h"
 
 #include <gtest/gtest.h>
 
 #include "common/secure/join_code.h"
 #include "proto/wire.pb.h"
 
-namespace trocar::bridge {
+namespace trocar::page {
 namespace {
 
 std::optional<JoinRefusal> read(const std::string& text, JoinRequest& request) {
@@ -57,10 +57,10 @@ TEST(JoinRequest, AWrongCodeCountsAsATry) {
 
 TEST(JoinRequest, OfAPageThatComesBackIsTriedAgainWhileItsSessionIsAway) {
   JoinRequest request;
-  EXPECT_EQ(reason_of_absence(request), proto::GOODBYE_SERVER_CLOSING);
+  EXPECT_EQ(reason_to_wait(request, wire::EndReason::Full), wire::EndReason::Full);
   request.return_token = Bytes(16, 1);
-  EXPECT_EQ(reason_of_absence(request), proto::GOODBYE_TIMEOUT);
+  EXPECT_EQ(reason_to_wait(request, wire::EndReason::Full), wire::EndReason::Timeout);
 }
 
 }  // namespace
-}  // namespace trocar::bridge
+}  // namespace trocar::page

@@ -1,6 +1,6 @@
 // The copy of a session from which those who share a connection are given their pictures.
 
-#include "server/web/bridge/session_copy.h"
+#include "server/watch/follow/session_copy.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,8 @@
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "proto/wire.pb.h"
-#include "server/web/bridge/server_clock.h"
 
-namespace trocar::bridge {
+namespace trocar::follow {
 namespace {
 
 using proto::Envelope;
@@ -270,16 +269,5 @@ TEST(SessionCopy, keeps_lists_and_lines_for_who_comes_late) {
   EXPECT_EQ(lists, 1);
 }
 
-TEST(ServerClock, takes_the_shortest_of_the_last_round_trips) {
-  ServerClock clock;
-  EXPECT_EQ(clock.at(1000), 0u);
-  clock.note(1000, 1100, 5050);  // there and back in 100: 5050 was when it was 1050 here
-  EXPECT_EQ(clock.at(2000), 6000u);
-  clock.note(2000, 4000, 6500);  // slow, and off by 500
-  EXPECT_EQ(clock.at(2000), 6000u);
-  clock.note(5000, 4000, 1);  // cannot be
-  EXPECT_EQ(clock.at(2000), 6000u);
-}
-
 }  // namespace
-}  // namespace trocar::bridge
+}  // namespace trocar::follow

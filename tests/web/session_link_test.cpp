@@ -1,6 +1,6 @@
 // A session's address that is silent takes no time away from the next one.
 
-#include "server/web/bridge/session_link.h"
+#include "server/watch/follow/session_link.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include <optional>
 #include <string>
 
-#include "server/web/bridge/bridge.h"
+#include "server/watch/follow/sessions.h"
 
-namespace trocar::bridge {
+namespace trocar::follow {
 namespace {
 
 using tcp = asio::ip::tcp;
@@ -37,9 +37,9 @@ TEST(SessionLink, a_silent_address_is_left_and_the_next_one_tried) {
   asio::io_context context;
   SilentPlace own(context), further(context);
   const SessionAddress session{own.name(), "127.0.0.1", own.port()};
-  Bridge bridge({session});
-  bridge.note_further(session.name, {}, further.name());
-  SessionLink link(context.get_executor(), bridge);
+  Sessions sessions({session});
+  sessions.note_further(session.name, {}, further.name());
+  SessionLink link(context.get_executor(), sessions);
   std::optional<bool> is_open;
   asio::co_spawn(context, link.open(session), [&](std::exception_ptr failure, bool opened) {
     EXPECT_FALSE(failure);
@@ -54,4 +54,4 @@ TEST(SessionLink, a_silent_address_is_left_and_the_next_one_tried) {
 }
 
 }  // namespace
-}  // namespace trocar::bridge
+}  // namespace trocar::follow

@@ -9,7 +9,7 @@
 #include "server/app/config/log_options.h"
 #include "server/app/config/nats_options.h"
 #include "server/app/config/place.h"
-#include "server/broadcast/subjects.h"
+#include "server/watch/bus/subjects.h"
 
 namespace trocar::app {
 namespace {
@@ -52,7 +52,7 @@ CLI::Validator short_name() {
 
 CLI::Validator session_name() {
   return {[](std::string& text) -> std::string {
-            return broadcast::is_session_name(text)
+            return bus::is_session_name(text)
                        ? ""
                        : "is not a name of 1 to 64 letters, digits, hyphens and underscores";
           },

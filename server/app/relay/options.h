@@ -10,12 +10,12 @@
 #include "common/secure/join_code.h"
 #include "server/app/config/option_origins.h"
 #include "server/bus/bus_place.h"
-#include "server/web/bridge/bridge.h"
+#include "server/watch/follow/sessions.h"
 
 namespace trocar::app {
 
 struct RelayOptions {
-  bridge::SessionAddress server;
+  follow::SessionAddress server;
   std::optional<secure::JoinCode> code;  // empty: that of the server on this machine
   std::string address = "127.0.0.1";
   std::uint16_t port = 7695;

@@ -24,15 +24,15 @@
 #include "common/secure/private_files.h"
 #include "common/secure/public_host.h"
 #include "common/secure/tls.h"
-#include "server/broadcast/bus_channel.h"
-#include "server/broadcast/publisher.h"
-#include "server/broadcast/tap.h"
-#include "server/relay/relay.h"
-#include "server/relay/uplink.h"
 #include "server/session/monitoring/exposition.h"
 #include "server/session/monitoring/figures_server.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/validation.h"
+#include "server/watch/bus/bus_channel.h"
+#include "server/watch/bus/publisher.h"
+#include "server/watch/bus/tap.h"
+#include "server/watch/follow/uplink.h"
+#include "server/watch/relay/relay.h"
 
 namespace trocar::app {
 namespace {
@@ -144,7 +144,7 @@ class RelayServer {
  public:
   // `context` outlives this.
   RelayServer(asio::io_context& context, const RelayOptions& options, Access access,
-              std::unique_ptr<relay::Upstream> upstream);
+              std::unique_ptr<follow::Upstream> upstream);
   ~RelayServer();
 
   Status run();
@@ -177,44 +177,44 @@ relay::RelayOptions relay_options(const RelayOptions& options, const Access& acc
   return chosen;
 }
 
-Result<std::unique_ptr<broadcast::Channel>> open_channel(asio::io_context& context,
-                                                         const RelayOptions& options) {
+Result<std::unique_ptr<bus::Channel>> open_channel(asio::io_context& context,
+                                                   const RelayOptions& options) {
   auto bus = bus::Bus::connect(options.nats, "trocar-relay " + name_of(options), true);
   if (!bus) return bus.error();
-  return std::unique_ptr<broadcast::Channel>(
-      std::make_unique<broadcast::BusChannel>(context.get_executor(), std::move(*bus)));
+  return std::unique_ptr<bus::Channel>(
+      std::make_unique<bus::BusChannel>(context.get_executor(), std::move(*bus)));
 }
 
 template <typename Kind>
-Result<std::unique_ptr<relay::Upstream>> listening(std::unique_ptr<Kind> made) {
+Result<std::unique_ptr<follow::Upstream>> listening(std::unique_ptr<Kind> made) {
   if (const auto heard = made->listen(); !heard) return heard.error();
-  return std::unique_ptr<relay::Upstream>(std::move(made));
+  return std::unique_ptr<follow::Upstream>(std::move(made));
 }
 
-Result<std::unique_ptr<relay::Upstream>> open_upstream(asio::io_context& context,
-                                                       const RelayOptions& options,
-                                                       const Access& access) {
+Result<std::unique_ptr<follow::Upstream>> open_upstream(asio::io_context& context,
+                                                        const RelayOptions& options,
+                                                        const Access& access) {
   const auto executor = context.get_executor();
-  std::unique_ptr<broadcast::Channel> channel;
+  std::unique_ptr<bus::Channel> channel;
   if (!options.nats.url.empty()) {
     auto opened = open_channel(context, options);
     if (!opened) return opened.error();
     channel = std::move(*opened);
   }
   if (!options.from_nats.empty())
-    return listening(std::make_unique<broadcast::Tap>(
-        executor, std::move(channel), broadcast::TapOptions{.session = options.from_nats}));
-  std::unique_ptr<relay::Upstream> uplink = std::make_unique<relay::Uplink>(
-      executor, relay::UplinkOptions{
+    return listening(std::make_unique<bus::Tap>(executor, std::move(channel),
+                                                bus::TapOptions{.session = options.from_nats}));
+  std::unique_ptr<follow::Upstream> uplink = std::make_unique<follow::Uplink>(
+      executor, follow::UplinkOptions{
                     .server = options.server, .code = access.server, .name = name_of(options)});
   if (!channel) return uplink;
-  return listening(std::make_unique<broadcast::Publisher>(
-      executor, std::move(uplink), std::move(channel),
-      broadcast::PublisherOptions{.session = options.publish}));
+  return listening(
+      std::make_unique<bus::Publisher>(executor, std::move(uplink), std::move(channel),
+                                       bus::PublisherOptions{.session = options.publish}));
 }
 
 RelayServer::RelayServer(asio::io_context& context, const RelayOptions& options, Access access,
-                         std::unique_ptr<relay::Upstream> upstream)
+                         std::unique_ptr<follow::Upstream> upstream)
     : io_(context),
       options_(options),
       access_(std::move(access)),

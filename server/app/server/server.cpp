@@ -36,13 +36,13 @@
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
 #include "server/session/agones/agones.h"
-#include "server/session/guests/guest_connections.h"
 #include "server/session/monitoring/disk_watch.h"
 #include "server/session/monitoring/figures_server.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator.h"
 #include "server/tissue/touch/haptic_law.h"
+#include "server/watch/crowd/guest_connections.h"
 
 namespace trocar::app {
 namespace {
@@ -122,8 +122,8 @@ class Server {
   asio::signal_set signals_{io_};
   asio::steady_timer poll_{io_}, attention_{io_}, disk_timer_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
-  std::unique_ptr<guests::GuestConnections> connections_;  // all of them, guests as well
-  std::unique_ptr<discovery::Announcer> announcer_;        // null: the session is not announced
+  std::unique_ptr<crowd::GuestConnections> connections_;  // all of them, guests as well
+  std::unique_ptr<discovery::Announcer> announcer_;       // null: the session is not announced
   std::unique_ptr<replication::Replicator> replicator_;
   std::unique_ptr<monitoring::FiguresServer> figures_;  // null: not asked for
   std::uint16_t sidecar_port_ = agones::kDefaultPort;
@@ -170,7 +170,7 @@ Status Server::open() {
   auto listening = net::TcpServer::listen(io_, tcp);
   if (!listening) return listening.error();
   tcp_ = std::move(*listening);
-  connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
+  connections_ = std::make_unique<crowd::GuestConnections>(*tcp_);
 
   auto journal = open_journal(options_.journal, organ, layout, start_.continues,
                               start_.simulation.rules().bleeding, start_.key);

@@ -169,7 +169,7 @@ Status CommandLine::finish() {
     return Error{ErrorCode::Usage, "--new-recordings-key: needs --recordings, whose links it ends"};
   options_.sessions.clear();
   for (const auto& text : sessions_) {
-    bridge::SessionAddress session;
+    follow::SessionAddress session;
     session.name = text;
     if (auto s = parse_place("--session", text, session.host, session.port); !s) return s;
     options_.sessions.push_back(std::move(session));

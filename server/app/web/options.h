@@ -8,14 +8,14 @@
 
 #include "common/base/result.h"
 #include "server/app/config/option_origins.h"
-#include "server/web/bridge/watcher.h"
+#include "server/watch/follow/sessions.h"
 
 namespace trocar::app {
 
 struct WebOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 7691;
-  std::vector<bridge::SessionAddress> sessions;
+  std::vector<follow::SessionAddress> sessions;
   std::string recordings_folder;  // empty: none
   std::string page_folder;        // empty: beside the program
   std::string metrics_address;    // empty: no figures

@@ -64,13 +64,13 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   const WebOptions options;
   WebContent content;
   const secure::TlsContext tls;
-  bridge::Bridge bridge;
+  page::Bridge bridge;
   tcp::acceptor acceptor{context};
   std::unique_ptr<monitoring::FiguresServer> figures;  // null: not asked for
   access::TryLimiter key_limiter;
   std::optional<RecordingChecks> checks;  // where there are recordings
   WebCounters counters;
-  std::map<std::string, int> open_by_address;
+  access::Room room;  // for connections
   // Whoever is connected can be cut: by closing its socket, or its watcher.
   std::uint64_t next_id = 1;
   std::map<std::uint64_t, std::function<void()>> cuts;
@@ -84,7 +84,8 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
         options(given),
         content(std::move(what)),
         tls(std::move(with)),
-        bridge(given.sessions) {
+        bridge(given.sessions, given.most_connections, given.most_per_address),
+        room(given.most_connections, given.most_per_address) {
     if (content.recordings)
       checks.emplace(io, content.state_folder, std::chrono::seconds(given.check_limit_s));
   }
@@ -136,25 +137,15 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   }
 
   bool admit(const std::string& peer) {
-    const auto address = access::counted_as(peer);
-    const auto found = open_by_address.find(address);
-    const bool is_address_full =
-        found != open_by_address.end() && found->second >= options.most_per_address;
-    const bool is_full = counters.open >= static_cast<std::size_t>(options.most_connections);
-    if ((is_address_full || is_full) && !make_room(address, is_address_full)) {
+    using Place = access::Room::Place;
+    const auto place = room.place_for(peer);
+    if (place != Place::Free && !make_room(access::counted_as(peer), place == Place::AddressFull)) {
       ++counters.refused_full;
       return false;
     }
-    ++open_by_address[address];
-    ++counters.open;
+    room.enter(peer);
     ++counters.connections;
     return true;
-  }
-
-  void forget(const std::string& peer) {
-    --counters.open;
-    const auto found = open_by_address.find(access::counted_as(peer));
-    if (found != open_by_address.end() && --found->second <= 0) open_by_address.erase(found);
   }
 
   asio::awaitable<void> accept() {
@@ -181,7 +172,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     const auto id = next_id++;
     const auto ended = [self, peer, id](std::exception_ptr failure) {
       self->silent.erase(id);
-      self->forget(peer);
+      self->room.leave(peer);
       rethrow(failure);
     };
     if (tls)
@@ -280,7 +271,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     cuts[id] = [below] { below->cut(); };
     const bool is_open = co_await below->accept(request);
     if (!is_open) co_return;
-    const auto watcher = std::make_shared<bridge::Watcher>(std::move(socket), bridge);
+    const auto watcher = std::make_shared<page::Watcher>(std::move(socket), bridge);
     cuts[id] = [watcher] { watcher->cut(); };
     co_await watcher->run();
   }
@@ -442,9 +433,11 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
 
   std::string metrics() const {
     const auto& b = bridge.counters;
+    const auto& sessions = bridge.sessions;
     monitoring::Exposition text("trocar_web_");
     const auto number = [](std::uint64_t count) { return static_cast<double>(count); };
-    text.gauge("connections_open", "Connections of browsers now.", number(counters.open));
+    text.gauge("connections_open", "Connections of browsers now.",
+               static_cast<double>(room.count()));
     text.counter("connections_total", "Connections taken.", number(counters.connections));
     text.counter("connections_refused_total", "Connections beyond a limit.",
                  number(counters.refused_full));
@@ -463,8 +456,8 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     text.counter("sessions_unreachable_total", "Sessions that did not answer.",
                  number(b.unreachable));
     text.gauge("carriers", "Connections to sessions that many share, now.", number(b.carriers));
-    text.counter("session_messages_total", "Messages from sessions.", number(b.session_messages));
-    text.counter("session_bytes_total", "Bytes of these.", number(b.session_bytes));
+    text.counter("session_messages_total", "Messages from sessions.", number(sessions.messages));
+    text.counter("session_bytes_total", "Bytes of these.", number(sessions.bytes));
     text.counter("frames_skipped_total", "Frames left out for those who share a connection.",
                  number(b.frames_skipped));
     text.counter("messages_down_total", "Messages to browsers.", number(b.messages_down));

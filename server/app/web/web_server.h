@@ -18,7 +18,7 @@
 #include "common/base/result.h"
 #include "common/secure/tls.h"
 #include "server/app/web/options.h"
-#include "server/web/bridge/watcher.h"
+#include "server/watch/page/watcher.h"
 #include "server/web/site/page_files.h"
 #include "server/web/site/recordings.h"
 
@@ -28,7 +28,6 @@ struct WebCounters {
   std::uint64_t connections = 0, refused_full = 0;
   std::uint64_t requests = 0, not_found = 0, forbidden = 0, malformed = 0;
   std::uint64_t recording_bytes = 0;
-  std::size_t open = 0;  // connections, now
 };
 
 struct WebContent {

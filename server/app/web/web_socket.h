@@ -20,7 +20,7 @@
 
 #include "common/base/no_throw.h"
 #include "common/wire/framing.h"
-#include "server/web/bridge/browser_socket.h"
+#include "server/watch/page/browser_socket.h"
 
 namespace trocar::app {
 
@@ -30,7 +30,7 @@ namespace beast = boost::beast;
 inline constexpr std::chrono::seconds kIdle{10};
 
 template <typename Below>  // beast::tcp_stream, or TLS above it
-class WebSocket final : public bridge::BrowserSocket {
+class WebSocket final : public page::BrowserSocket {
  public:
   WebSocket(Below below, std::string peer) : stream_(std::move(below)), peer_(std::move(peer)) {
     beast::get_lowest_layer(stream_).expires_never();
@@ -50,9 +50,9 @@ class WebSocket final : public bridge::BrowserSocket {
 
   asio::any_io_executor executor() override { return stream_.get_executor(); }
 
-  asio::awaitable<bridge::BrowserMessage> read() override {
-    using Kind = bridge::BrowserMessage::Kind;
-    bridge::BrowserMessage message;
+  asio::awaitable<page::BrowserMessage> read() override {
+    using Kind = page::BrowserMessage::Kind;
+    page::BrowserMessage message;
     buffer_.clear();
     const auto [error, count] = co_await stream_.async_read(buffer_, kNoThrow);
     if (error) {

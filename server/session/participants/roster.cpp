@@ -5,17 +5,13 @@
 #include <charconv>
 
 #include "common/base/printable.h"
+#include "server/session/access/room.h"
 #include "server/session/participants/look_alike.h"
 
 namespace trocar::participants {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 32;
-
-// Places for watchers that observers leave free, however many come: a session is led by somebody.
-int kept_for_instructors(int watchers) {
-  return watchers < 2 ? 0 : std::max(1, watchers / 10);
-}
 
 // Who has asked for a name finds the other one in the list.
 std::string called(std::string_view name, const Participant& other) {
@@ -32,7 +28,7 @@ std::string print_mm(float mm) {
 }  // namespace
 
 int places_for(Role role, const Places& places) {
-  if (role == Role::Observer) return places.watchers - kept_for_instructors(places.watchers);
+  if (role == Role::Observer) return access::places_for_observers(places.watchers);
   return (places.watchers + 1) / 2;
 }
 

@@ -269,20 +269,4 @@ wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {
   return wire::encode_envelope(envelope);
 }
 
-wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick,
-                              std::uint64_t server_time_us) {
-  proto::Envelope envelope;
-  envelope.mutable_pong()->set_client_time_us(client_time_us);
-  envelope.mutable_pong()->set_tick(tick);
-  envelope.mutable_pong()->set_server_time_us(server_time_us);
-  return wire::encode_envelope(envelope);
-}
-
-wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text) {
-  proto::Envelope envelope;
-  envelope.mutable_goodbye()->set_reason(static_cast<proto::GoodbyeReason>(reason));
-  envelope.mutable_goodbye()->set_text(text);
-  return wire::encode_envelope(envelope);
-}
-
 }  // namespace trocar::replication

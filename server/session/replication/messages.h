@@ -26,6 +26,9 @@ class Participants;
 
 namespace trocar::replication {
 
+using wire::encode_goodbye;
+using wire::encode_pong;
+
 // Messages that clients and journal get alike.
 void describe(const std::vector<participants::Participant>& present, proto::Participants& message);
 void describe(const step::PublishedFrame& frame, proto::FrameState& message);
@@ -57,9 +60,6 @@ wire::SharedBytes encode_haptic_law(const wire::HapticLaw& law);
 // Returns what the tools of one participant feel in a frame; null: no hand feels any of them.
 wire::SharedBytes encode_touch(const step::PublishedFrame& frame, ParticipantSlot slot);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
-wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick,
-                              std::uint64_t server_time_us);
-wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 
 // One line for a person about what became of a claim: by whom it is held and what to do.
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster);

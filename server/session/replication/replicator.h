@@ -25,7 +25,7 @@
 // What people say goes to the part that it is for: hands.h, teaching.h, marks.h, drawing.h,
 // lesson_course.h. They speak to people through Audience, which this is.
 //
-// Guests of a carrier (server/session/guests) are let in as anybody is; what is for everybody goes
+// Guests of a carrier (server/watch/crowd) are let in as anybody is; what is for everybody goes
 // to the carrier once instead of to each of them.
 //
 // Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects

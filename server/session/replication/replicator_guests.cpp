@@ -41,10 +41,10 @@ std::optional<Ending> Replicator::handle_relay_report(Client& client,
   if (client.participant->role != participants::Role::Observer)
     return Ending{EndReason::Role, std::string("RelayReport: an observer may relay, and no ") +
                                        participants::name_of(client.participant->role)};
-  if (report.watchers() > kMostRelayed)
+  if (report.watchers() > wire::kMostRelayed)
     return Ending{EndReason::ProtocolError,
                   "RelayReport.watchers: " + std::to_string(report.watchers()) + ", at most " +
-                      std::to_string(kMostRelayed)};
+                      std::to_string(wire::kMostRelayed)};
   if (!client.reports.take(1, options_.clock_ns()))
     return Ending{EndReason::ProtocolError, "RelayReport: more than one in a second"};
   roster_.set_relayed(client.participant->slot, report.watchers());

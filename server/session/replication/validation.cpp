@@ -14,10 +14,6 @@
 namespace trocar::replication {
 namespace {
 
-static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
-static_assert(static_cast<int>(EndReason::NameInvalid) == proto::GOODBYE_NAME_INVALID);
-static_assert(static_cast<int>(EndReason::Closed) == proto::GOODBYE_CLOSED);
-static_assert(kEndReasonCount == proto::GoodbyeReason_ARRAYSIZE);
 static_assert(static_cast<int>(TeachAction::HandOver) == proto::TEACH_HAND_OVER &&
               kTeachActions == proto::TeachAction_ARRAYSIZE);
 constexpr std::size_t kSecretBytes = 5;
@@ -30,15 +26,6 @@ Error bad(std::string message) {
 }
 
 }  // namespace
-
-const char* name_of(EndReason reason) {
-  static constexpr std::array<const char*, kEndReasonCount> kNames{
-      "unspecified",  "server-closing", "protocol-error", "version",        "full",
-      "name-taken",   "role",           "too-slow",       "timeout",        "code-wrong",
-      "code-expired", "code-used-up",   "code-revoked",   "too-many-tries", "code-role",
-      "name-invalid", "put-out",        "closed"};
-  return kNames[static_cast<std::size_t>(reason)];
-}
 
 Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   if (hello.protocol_major() != kProtocolMajor) {

@@ -12,6 +12,7 @@
 #include "common/base/result.h"
 #include "common/tool/tool.h"
 #include "common/wire/hand_report.h"
+#include "common/wire/session_messages.h"
 #include "server/session/participants/roster.h"
 
 namespace trocar::proto {
@@ -28,32 +29,9 @@ namespace trocar::replication {
 
 inline constexpr float kMaxDistanceFromOriginM = 2.0f;
 inline constexpr float kMaxQuaternionError = 1e-3f;
-inline constexpr std::uint32_t kMostRelayed = 100'000;  // people who watch through one relay
 
-// Values of proto::GoodbyeReason, here so that headers need no generated code.
-enum class EndReason : std::uint8_t {
-  Unspecified = 0,
-  ServerClosing = 1,
-  ProtocolError = 2,
-  Version = 3,
-  Full = 4,
-  NameTaken = 5,
-  Role = 6,
-  TooSlow = 7,
-  Timeout = 8,
-  CodeWrong = 9,
-  CodeExpired = 10,
-  CodeUsedUp = 11,
-  CodeRevoked = 12,
-  TooManyTries = 13,
-  CodeRole = 14,
-  NameInvalid = 15,
-  PutOut = 16,
-  Closed = 17,
-};
-inline constexpr int kEndReasonCount = 18;
-// In words for figures, such as "code-wrong".
-const char* name_of(EndReason reason);
+using wire::EndReason;
+using wire::kEndReasonCount;
 
 struct HelloRequest {
   std::uint32_t protocol_minor = 0;

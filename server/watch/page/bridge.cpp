@@ -1,0 +1,21 @@
+#include "server/watch/page/bridge.h"
+
+namespace trocar::page {
+
+Bridge::Bridge(std::vector<follow::SessionAddress> known, int most_connections,
+               int most_connections_per_address)
+    : sessions(std::move(known)),
+      observers(access::places_for_observers(most_connections),
+                access::places_for_observers(most_connections_per_address)) {}
+
+std::shared_ptr<Carrier> Bridge::carrier_of(const follow::SessionAddress& session,
+                                            const asio::any_io_executor& executor) {
+  auto& place = carriers_[session.name];
+  if (auto carrier = place.lock(); carrier && !carrier->has_ended()) return carrier;
+  auto carrier = std::make_shared<Carrier>(executor, sessions, counters, session);
+  place = carrier;
+  carrier->start();
+  return carrier;
+}
+
+}  // namespace trocar::page

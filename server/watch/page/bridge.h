@@ -1,0 +1,42 @@
+#pragma once
+
+// All who watch through this program share a Bridge: it knows the sessions that may be watched, the
+// carrier of each, counters, and the limit of wrong tries. Thread: that of its I/O context.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/any_io_executor.hpp>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/session/access/room.h"
+#include "server/session/access/try_limiter.h"
+#include "server/watch/follow/sessions.h"
+#include "server/watch/page/carrier.h"
+#include "server/watch/page/page_counters.h"
+
+namespace trocar::page {
+
+class Bridge {
+ public:
+  // `most_connections`: that browsers may have, in all and from one address. Observers leave some
+  // of them to who leads.
+  Bridge(std::vector<follow::SessionAddress> known, int most_connections,
+         int most_connections_per_address);
+
+  // The connection that those who only watch share; a new one if the last has ended.
+  std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session,
+                                      const asio::any_io_executor& executor);
+
+  follow::Sessions sessions;
+  access::Room observers;
+  access::TryLimiter limiter;
+  PageCounters counters;
+
+ private:
+  std::map<std::string, std::weak_ptr<Carrier>> carriers_;  // by the session's name
+};
+
+}  // namespace trocar::page

@@ -1,0 +1,28 @@
+#include "server/watch/page/page_messages.h"
+
+#include "proto/wire.pb.h"
+
+namespace trocar::page {
+
+bool read_page_message(BytesView bytes, proto::Envelope& message) {
+  if (bytes.size() > wire::kMaxUpstreamBytes - wire::kHeaderBytes ||
+      !wire::decode_envelope(bytes, message).ok())
+    return false;
+  switch (message.message_case()) {
+    case proto::Envelope::kFrameAck:
+    case proto::Envelope::kPing:
+    case proto::Envelope::kKeyframeRequest:
+    case proto::Envelope::kMarkRequest:
+    case proto::Envelope::kPointRequest:
+    case proto::Envelope::kStrokeRequest:
+    case proto::Envelope::kTeachRequest:
+    case proto::Envelope::kViewRequest:
+    case proto::Envelope::kLessonRequest:
+    case proto::Envelope::kBye:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace trocar::page
