@@ -1,7 +1,7 @@
 #pragma once
 
-// The panels of a session: what they say is read from the replica, the source of its messages and a pane,
-// and kept nowhere. Thread: render thread.
+// The panels of a session: what they say is read from the replica, the source of its messages and a
+// pane, and kept nowhere. Thread: render thread.
 
 #include <vector>
 
