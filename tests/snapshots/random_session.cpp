@@ -125,7 +125,7 @@ SnapshotScene loaded_scene(std::uint64_t seed) {
 }
 
 RandomSession::RandomSession(SnapshotScene scene, std::uint64_t seed)
-    : simulation_(std::move(scene.organ), 1, {}, std::move(scene.loads)),
+    : simulation_(std::move(scene.organ), 1, {.loads = std::move(scene.loads)}),
       reach_m_(scene.reach_m),
       random_(seed),
       hands_(kHands) {
