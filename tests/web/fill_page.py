@@ -44,8 +44,8 @@ def join(name, role, code):
         while not head.endswith(b"\r\n\r\n"):
             head += read_exactly(connection, 1)
         text = json.dumps({"name": name, "role": role, "code": code}).encode()
-        # A mask of zeros changes nothing.
-        connection.sendall(bytes([0x81, 0x80 | 126]) + struct.pack(">H", len(text)) + MASK + text)
+        # It is short enough for a length of one byte, and a mask of zeros changes nothing.
+        connection.sendall(bytes([0x81, 0x80 | len(text)]) + MASK + text)
         return connection, first_message(connection)
     except ConnectionError:
         return connection, None
