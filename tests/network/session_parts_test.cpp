@@ -106,12 +106,12 @@ class SessionParts : public ::testing::Test {
   access::Door door_;
   std::vector<wire::LessonKind> recorded_;
   std::vector<float> rates_;
-  Room room_{options_, audience_, roster_, inbox_};
-  Hands hands_{room_, counters_};
-  Marks marks_{room_};
-  Pace pace_{room_, hands_.held()};
-  Drawing drawing_{room_};
-  Teaching teaching_{room_, door_, hands_, pace_, drawing_};
+  SessionContext session_{options_, audience_, roster_, inbox_};
+  Hands hands_{session_, counters_};
+  Marks marks_{session_};
+  Pace pace_{session_, hands_.held()};
+  Drawing drawing_{session_};
+  Teaching teaching_{session_, door_, hands_, pace_, drawing_};
   Speaker ada_{1, options_}, ben_{2, options_};
 };
 
@@ -213,8 +213,7 @@ TEST_F(SessionParts, SamplesOfTheStreamMustGrowAndLateDatagramsAreLeftOut) {
 }
 
 TEST_F(SessionParts, ASessionWithoutALessonSaysSo) {
-  LessonCourse course(room_);
-  EXPECT_FALSE(course.is_given());
+  LessonCourse course(session_);
   proto::LessonRequest request;
   request.set_action(proto::LESSON_NEXT);
   EXPECT_FALSE(course.ask(ada_, request, {}));

@@ -4,14 +4,15 @@
 
 namespace trocar::replication {
 
-void Room::record(wire::LessonKind kind, const google::protobuf::MessageLite& message) const {
+void SessionContext::record(wire::LessonKind kind,
+                            const google::protobuf::MessageLite& message) const {
   if (!options.on_lesson) return;
   wire::LessonEntry entry{kind, Bytes(message.ByteSizeLong())};
   message.SerializeToArray(entry.message.data(), static_cast<int>(entry.message.size()));
   options.on_lesson(std::move(entry));
 }
 
-void Room::refuse(const Speaker& who, const std::string& why) const {
+void SessionContext::refuse(const Speaker& who, const std::string& why) const {
   proto::Envelope answer;
   auto& event = *answer.mutable_teach_event();
   event.set_tick(audience.newest_tick());

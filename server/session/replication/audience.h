@@ -24,11 +24,6 @@ class MessageLite;
 
 namespace trocar::replication {
 
-struct Ending {
-  EndReason reason = EndReason::Unspecified;
-  std::string text;
-};
-
 // Somebody who is here: who it is, and how much it may still say.
 struct Speaker {
   Speaker(net::ConnectionId its_id, const ReplicatorOptions& options)
@@ -67,7 +62,7 @@ class Audience {
 };
 
 // All parts of a session share this.
-struct Room {
+struct SessionContext {
   const ReplicatorOptions& options;
   Audience& audience;
   participants::Roster& roster;

@@ -32,7 +32,7 @@ std::optional<Ending> Drawing::point(Speaker& who, const proto::PointRequest& re
     if (const auto valid = check_place(request.position_m()); !valid)
       return Ending{EndReason::ProtocolError, "PointRequest.position_m: " + valid.error().message};
   // Each goes to everybody, so that what comes too often is left out; an end is always told.
-  const auto now = room_.now_ns();
+  const auto now = session_.now_ns();
   if (points && who.pointed_ns != 0 && now - who.pointed_ns < kLeastGapNs) return std::nullopt;
   if (!points && who.pointed_ns == 0) return std::nullopt;
   who.pointed_ns = points ? now : 0;
@@ -42,8 +42,8 @@ std::optional<Ending> Drawing::point(Speaker& who, const proto::PointRequest& re
   if (points) *point.mutable_position_m() = request.position_m();
   proto::Envelope event;
   *event.mutable_point_event() = point;
-  room_.record(wire::LessonKind::Said, record);
-  room_.audience.offer(wire::encode_envelope(event));
+  session_.record(wire::LessonKind::Said, record);
+  session_.audience.offer(wire::encode_envelope(event));
   return std::nullopt;
 }
 
@@ -55,10 +55,10 @@ std::optional<Ending> Drawing::stroke(Speaker& who, const proto::StrokeRequest& 
                   "StrokeRequest: drawing is the instructor's, not of " + wire::one_of(role)};
   const auto points = check_stroke(request);
   if (!points) return Ending{EndReason::ProtocolError, points.error().message};
-  const bool is_early = !who.strokes.take(1, room_.now_ns());
+  const bool is_early = !who.strokes.take(1, session_.now_ns());
   if (is_early || board_.is_full_for(points->size())) {
-    room_.refuse(who, is_early ? "not drawn: at most ten strokes a second"
-                               : "not drawn: the drawing is full, wipe it first");
+    session_.refuse(who, is_early ? "not drawn: at most ten strokes a second"
+                                  : "not drawn: the drawing is full, wipe it first");
     return std::nullopt;
   }
   const auto* stroke = board_.add(who.participant->slot, *points, layout);
@@ -66,7 +66,7 @@ std::optional<Ending> Drawing::stroke(Speaker& who, const proto::StrokeRequest& 
   proto::Envelope event;
   event.mutable_drawing()->set_is_addition(true);
   write(*stroke, *event.mutable_drawing()->add_stroke());
-  room_.audience.broadcast(wire::encode_envelope(event));
+  session_.audience.broadcast(wire::encode_envelope(event));
   record();
   return std::nullopt;
 }
@@ -79,7 +79,7 @@ void Drawing::wipe() {
   board_.wipe();
   proto::Envelope event;
   describe(*event.mutable_drawing());
-  room_.audience.broadcast(wire::encode_envelope(event));
+  session_.audience.broadcast(wire::encode_envelope(event));
   record();
 }
 
@@ -87,7 +87,7 @@ void Drawing::wipe() {
 void Drawing::record() const {
   proto::Drawing drawing;
   describe(drawing);
-  room_.record(wire::LessonKind::Drawing, drawing);
+  session_.record(wire::LessonKind::Drawing, drawing);
 }
 
 std::optional<Ending> Drawing::view(Speaker& who, const proto::ViewRequest& request) {
@@ -95,8 +95,8 @@ std::optional<Ending> Drawing::view(Speaker& who, const proto::ViewRequest& requ
     return Ending{EndReason::ProtocolError, valid.error().message};
   const auto slot = who.participant->slot;
   // Whoever has just lost the view does not know it yet.
-  const auto now = room_.now_ns();
-  if (!room_.roster.find(slot)->leads_view || now - who.viewed_ns < kLeastViewGapNs)
+  const auto now = session_.now_ns();
+  if (!session_.roster.find(slot)->leads_view || now - who.viewed_ns < kLeastViewGapNs)
     return std::nullopt;
   who.viewed_ns = now;
   proto::LessonRecord record;
@@ -107,9 +107,9 @@ std::optional<Ending> Drawing::view(Speaker& who, const proto::ViewRequest& requ
   view.set_server_time_us(now / 1000);
   proto::Envelope event;
   *event.mutable_view_event() = view;
-  room_.record(wire::LessonKind::Said, record);
+  session_.record(wire::LessonKind::Said, record);
   last_view_ = wire::encode_envelope(event);
-  room_.audience.offer(last_view_, &who);
+  session_.audience.offer(last_view_, &who);
   return std::nullopt;
 }
 
@@ -117,11 +117,11 @@ bool Drawing::show_lines(const Speaker& newcomer) const {
   if (board_.strokes().empty()) return true;
   proto::Envelope event;
   describe(*event.mutable_drawing());
-  return room_.audience.send(newcomer, wire::encode_envelope(event));
+  return session_.audience.send(newcomer, wire::encode_envelope(event));
 }
 
 bool Drawing::show_view(const Speaker& newcomer) const {
-  return !last_view_ || room_.audience.send(newcomer, last_view_);
+  return !last_view_ || session_.audience.send(newcomer, last_view_);
 }
 
 }  // namespace trocar::replication

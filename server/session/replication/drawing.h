@@ -16,7 +16,7 @@ namespace trocar::replication {
 
 class Drawing {
  public:
-  explicit Drawing(Room& room) : room_(room) {}
+  explicit Drawing(SessionContext& session) : session_(session) {}
 
   std::optional<Ending> point(Speaker& who, const proto::PointRequest& request);
   // `layout` is that of the newest frame.
@@ -35,7 +35,7 @@ class Drawing {
   void describe(proto::Drawing& message) const;
   void record() const;
 
-  Room& room_;
+  SessionContext& session_;
   DrawingBoard board_;
   wire::SharedBytes last_view_;  // null: none since the view was given to somebody
 };

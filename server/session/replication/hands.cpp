@@ -28,7 +28,7 @@ std::optional<Ending> Hands::sample(Speaker& who, const proto::ToolSample& sampl
   const hands::ToolInput wanted{tool_slot(participant.slot, checked->tool), checked->sample,
                                 checked->client_time_us};
   const bool was_lent = held_.is_lent(wanted.tool);
-  if (const auto given = held_.apply(wanted, room_.now_ns())) room_.inbox.push_sample(*given);
+  if (const auto given = held_.apply(wanted, session_.now_ns())) session_.inbox.push_sample(*given);
   if (was_lent && !held_.is_lent(wanted.tool)) note_loan(wanted.tool);
   return std::nullopt;
 }
@@ -41,23 +41,23 @@ std::optional<Ending> Hands::report(Speaker& who, const proto::HandReport& messa
   auto report = check_hand_report(message, participant.tools.size());
   if (!report) return Ending{EndReason::ProtocolError, report.error().message};
   const auto moments = static_cast<double>(report->moments.size());
-  if (!who.hand_moments.take(moments, room_.now_ns())) {
+  if (!who.hand_moments.take(moments, session_.now_ns())) {
     ++counters_.floods;
     return Ending{EndReason::ProtocolError,
                   "HandReport: more than " +
-                      std::to_string(room_.options.max_hand_moments_per_second) +
+                      std::to_string(session_.options.max_hand_moments_per_second) +
                       " moments in a second: send one per frame"};
   }
   ++counters_.hand_reports;
-  if (!room_.options.on_hand_report) return std::nullopt;
+  if (!session_.options.on_hand_report) return std::nullopt;
   wire::HandRecord record{.tool = tool_slot(participant.slot, report->tool),
                           .report = std::move(*report)};
-  if (const auto& frame = room_.audience.newest_frame()) {
+  if (const auto& frame = session_.audience.newest_frame()) {
     record.tick = frame->tick;
     const auto shown = std::ranges::find(frame->tools, record.tool, &step::ToolFrame::tool);
     if (shown != frame->tools.end()) record.echo_time_us = shown->touch.echo_time_us;
   }
-  room_.options.on_hand_report(std::move(record));
+  session_.options.on_hand_report(std::move(record));
   return std::nullopt;
 }
 
@@ -76,35 +76,36 @@ std::optional<Ending> Hands::change_tool(Speaker& who, const proto::ToolChange& 
   if (!tool::is_valid(shape))
     return Ending{EndReason::ProtocolError, "ToolChange.shape: there is no such tool"};
   const auto slot = tool_slot(participant.slot, static_cast<int>(number));
-  room_.has_changed = true;
-  if (!who.changes.take(1, room_.now_ns())) return std::nullopt;
+  session_.has_changed = true;
+  if (!who.changes.take(1, session_.now_ns())) return std::nullopt;
   auto refused = std::exchange(participant.tools[number], shape);
-  if (room_.roster.change_tool(participant.slot, number, shape) &&
-      room_.inbox.try_push_change({slot, shape}))
+  if (session_.roster.change_tool(participant.slot, number, shape) &&
+      session_.inbox.try_push_change({slot, shape}))
     return std::nullopt;
   participant.tools[number] = refused;
-  (void)room_.roster.change_tool(participant.slot, number, refused);
+  (void)session_.roster.change_tool(participant.slot, number, refused);
   return std::nullopt;
 }
 
 void Hands::open(ParticipantSlot slot) {
   for (const auto& input : held_.open(slot)) {
-    room_.inbox.push_sample(input);
+    session_.inbox.push_sample(input);
     note_loan(input.tool);
   }
 }
 
 std::string Hands::hand_over(const hands::Handover& handover) {
   const auto [from, to] = handover;
-  if (!room_.inbox.try_push_handover(handover)) return "not done: too much is under way, ask again";
+  if (!session_.inbox.try_push_handover(handover))
+    return "not done: too much is under way, ask again";
   held_.hand_over(handover);
   const auto shape_of = [this](ToolSlot tool) {
-    return room_.roster.find(tool.owner())->tools[static_cast<std::size_t>(tool.number())];
+    return session_.roster.find(tool.owner())->tools[static_cast<std::size_t>(tool.number())];
   };
   const auto given = shape_of(from), taken = shape_of(to);
   for (const auto& [tool, shape] : {std::pair{from, taken}, std::pair{to, given}}) {
-    (void)room_.roster.change_tool(tool.owner(), tool.number(), shape);
-    if (auto* who = room_.audience.find(tool.owner()))
+    (void)session_.roster.change_tool(tool.owner(), tool.number(), shape);
+    if (auto* who = session_.audience.find(tool.owner()))
       who->participant->tools[static_cast<std::size_t>(tool.number())] = shape;
   }
   for (const auto tool : {from, to}) note_loan(tool);
@@ -112,8 +113,8 @@ std::string Hands::hand_over(const hands::Handover& handover) {
 }
 
 void Hands::note_loan(ToolSlot tool) {
-  room_.roster.set_lent(tool, held_.is_lent(tool));
-  room_.has_changed = true;
+  session_.roster.set_lent(tool, held_.is_lent(tool));
+  session_.has_changed = true;
 }
 
 }  // namespace trocar::replication

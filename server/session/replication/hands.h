@@ -15,7 +15,8 @@ namespace trocar::replication {
 
 class Hands {
  public:
-  Hands(Room& room, ReplicatorCounters& counters) : room_(room), counters_(counters) {}
+  Hands(SessionContext& session, ReplicatorCounters& counters)
+      : session_(session), counters_(counters) {}
 
   // `is_ordered`: it came by the stream alone, so that sequence numbers must grow.
   std::optional<Ending> sample(Speaker& who, const proto::ToolSample& sample, bool is_ordered);
@@ -32,7 +33,7 @@ class Hands {
   // Everybody is told whether the tool moves beside its hand's place.
   void note_loan(ToolSlot tool);
 
-  Room& room_;
+  SessionContext& session_;
   ReplicatorCounters& counters_;
   participants::HeldTools held_;
 };

@@ -26,8 +26,8 @@ const char* words_of(lesson::Answer answer) {
 
 }  // namespace
 
-LessonCourse::LessonCourse(Room& room) : room_(room) {
-  const auto& options = room.options;
+LessonCourse::LessonCourse(SessionContext& session) : session_(session) {
+  const auto& options = session.options;
   if (options.course)
     course_.emplace(std::move(*options.course));
   else if (options.lesson)
@@ -47,7 +47,7 @@ void LessonCourse::observe(const step::PublishedFrame& frame, const wire::Surfac
       recorded.set_name(picture.name);
       recorded.set_image(picture.bytes);
     }
-    room_.record(wire::LessonKind::Said, record);
+    session_.record(wire::LessonKind::Said, record);
   }
   for (const auto& event : frame.claim_events)
     if (wire::is_refusal(event.outcome) || event.outcome == wire::ClaimOutcome::Slipped)
@@ -59,27 +59,27 @@ void LessonCourse::observe(const step::PublishedFrame& frame, const wire::Surfac
   if (frame.frame % kFramesPerProgress != 0 || course_->is_over()) return;
   proto::Envelope event;
   describe(*course_, *event.mutable_lesson_progress());
-  room_.audience.offer(wire::encode_envelope(event));
+  session_.audience.offer(wire::encode_envelope(event));
 }
 
 void LessonCourse::tell_stage() {
   is_hint_told_ = course_->shows_hint();
   proto::LessonRecord record;
   describe(*course_, *record.mutable_stage());
-  room_.record(wire::LessonKind::Said, record);
+  session_.record(wire::LessonKind::Said, record);
   proto::Envelope event;
   *event.mutable_lesson_stage() = record.stage();
-  room_.audience.broadcast(wire::encode_envelope(event));
+  session_.audience.broadcast(wire::encode_envelope(event));
 }
 
 void LessonCourse::tell_line(const std::string& words, bool is_good) {
   log::info("{}", words);
   proto::Envelope event;
-  event.mutable_teach_event()->set_tick(room_.audience.newest_tick());
+  event.mutable_teach_event()->set_tick(session_.audience.newest_tick());
   event.mutable_teach_event()->set_is_done(true);
   event.mutable_teach_event()->set_is_trouble(!is_good);
   event.mutable_teach_event()->set_text(words);
-  room_.audience.broadcast(wire::encode_envelope(event));
+  session_.audience.broadcast(wire::encode_envelope(event));
 }
 
 std::optional<Ending> LessonCourse::ask(Speaker& who, const proto::LessonRequest& request,
@@ -101,31 +101,31 @@ std::optional<Ending> LessonCourse::ask(Speaker& who, const proto::LessonRequest
                   "LessonRequest.tool: " + std::to_string(request.tool()) + ", you have " +
                       std::to_string(who.participant->tools.size()) + " (counted from 0)"};
   const auto refuse = [&](const std::string& why) {
-    room_.refuse(who, "not done: " + why);
+    session_.refuse(who, "not done: " + why);
     return std::nullopt;
   };
   if (!course_) return refuse("this session gives no lesson");
-  if (!who.sayings.take(0.5, room_.now_ns())) return refuse("wait a second");
+  if (!who.sayings.take(0.5, session_.now_ns())) return refuse("wait a second");
   if (!has_begun_) return refuse("the lesson begins when somebody has a tool");
   const auto tool = tool_slot(slot, static_cast<int>(request.tool()));
   proto::LessonRecord record;
-  record.mutable_input()->set_tick(room_.audience.newest_tick());
+  record.mutable_input()->set_tick(session_.audience.newest_tick());
   record.mutable_input()->set_action(request.action());
   if (answers) record.mutable_input()->set_tool(tool.value);
   if (answers) {
     const auto answer =
-        course_->answer(tool, moment_of(*room_.audience.newest_frame(), layout, tips_));
+        course_->answer(tool, moment_of(*session_.audience.newest_frame(), layout, tips_));
     if (answer == lesson::Answer::NotAsked || answer == lesson::Answer::NoTissue)
       return refuse(words_of(answer));
-    room_.record(wire::LessonKind::Said, record);
+    session_.record(wire::LessonKind::Said, record);
     tell_line(who.participant->name + " says that it is here: " + words_of(answer),
               answer == lesson::Answer::Right);
     if (answer == lesson::Answer::Wrong) return std::nullopt;
     tell_line(words_of_last_stage(*course_));
   } else {
     action == proto::LESSON_NEXT ? course_->skip() : course_->restart();
-    room_.record(wire::LessonKind::Said, record);
-    if (auto* gate = room_.options.gate)
+    session_.record(wire::LessonKind::Said, record);
+    if (auto* gate = session_.options.gate)
       gate->note_action(who.applicant,
                         action == proto::LESSON_NEXT ? "next-stage" : "restart-lesson");
     tell_line(who.participant->name + (action == proto::LESSON_NEXT ? " goes on to the next stage"
@@ -139,7 +139,7 @@ bool LessonCourse::show(const Speaker& newcomer) const {
   if (!course_) return true;
   proto::Envelope event;
   describe(*course_, *event.mutable_lesson_stage());
-  return room_.audience.send(newcomer, wire::encode_envelope(event));
+  return session_.audience.send(newcomer, wire::encode_envelope(event));
 }
 
 }  // namespace trocar::replication

@@ -15,9 +15,8 @@ namespace trocar::replication {
 class LessonCourse {
  public:
   // Gives the lesson, or goes on with the course, that the options name, if any.
-  explicit LessonCourse(Room& room);
+  explicit LessonCourse(SessionContext& session);
 
-  bool is_given() const { return course_.has_value(); }
   // `layout`: of the frame's epoch.
   void observe(const step::PublishedFrame& frame, const wire::SurfaceLayout& layout);
   std::optional<Ending> ask(Speaker& who, const proto::LessonRequest& request,
@@ -29,7 +28,7 @@ class LessonCourse {
   void tell_stage();
   void tell_line(const std::string& words, bool is_good = true);
 
-  Room& room_;
+  SessionContext& session_;
   std::optional<lesson::Course> course_;
   bool has_begun_ = false, is_hint_told_ = false;
   std::vector<lesson::Tip> tips_;

@@ -34,11 +34,12 @@ std::optional<Ending> Marks::ask(const Speaker& who, const proto::MarkRequest& r
   const auto wanted = static_cast<hands::MarkAction>(action);
   const bool is_return = wanted == hands::MarkAction::Return;
   const auto refuse = [&](const std::string& why) {
-    room_.audience.send(who, encode_mark_refusal(wanted, room_.audience.newest_tick(), name, why));
+    session_.audience.send(who,
+                           encode_mark_refusal(wanted, session_.audience.newest_tick(), name, why));
     return std::nullopt;
   };
   // Returning takes the simulation as long as beginning: what comes too soon is refused.
-  const auto now = room_.now_ns();
+  const auto now = session_.now_ns();
   if (last_ns_ && now - *last_ns_ < kLeastMarkGapNs)
     return refuse("less than a second after the last request, ask again");
   if (is_pending_ && is_paused)
@@ -48,9 +49,9 @@ std::optional<Ending> Marks::ask(const Speaker& who, const proto::MarkRequest& r
   last_ns_ = now;
   names_[*number] = name;
   is_pending_ = true;
-  if (auto* gate = room_.options.gate)
+  if (auto* gate = session_.options.gate)
     gate->note_action(who.applicant, is_return ? "return" : "mark");
-  room_.inbox.push_mark(wanted, static_cast<std::uint8_t>(*number));
+  session_.inbox.push_mark(wanted, static_cast<std::uint8_t>(*number));
   return std::nullopt;
 }
 
@@ -71,20 +72,20 @@ void Marks::note(const step::MarkEvent& event) {
   is_pending_ = false;
   proto::Envelope told;
   describe(event, names_[event.number], *told.mutable_mark_event());
-  room_.audience.broadcast(wire::encode_envelope(told));
+  session_.audience.broadcast(wire::encode_envelope(told));
   if (!event.is_done) return;
   proto::LessonRecord record;
   record.mutable_teach()->set_tick(event.tick);
   record.mutable_teach()->set_is_done(true);
   record.mutable_teach()->set_text(told.mark_event().text());
-  room_.record(wire::LessonKind::Said, record);
+  session_.record(wire::LessonKind::Said, record);
   if (event.action != hands::MarkAction::Set) return;
   is_set_[event.number] = true;
-  room_.audience.broadcast(list());
+  session_.audience.broadcast(list());
 }
 
 bool Marks::show(const Speaker& newcomer) const {
-  return std::ranges::count(is_set_, true) == 0 || room_.audience.send(newcomer, list());
+  return std::ranges::count(is_set_, true) == 0 || session_.audience.send(newcomer, list());
 }
 
 wire::SharedBytes Marks::list() const {

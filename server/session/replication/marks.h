@@ -14,7 +14,7 @@ namespace trocar::replication {
 
 class Marks {
  public:
-  explicit Marks(Room& room) : room_(room) {}
+  explicit Marks(SessionContext& session) : session_(session) {}
 
   // `is_paused`: the session stands still, so that a mark may be pending for long.
   std::optional<Ending> ask(const Speaker& who, const proto::MarkRequest& request, bool is_paused);
@@ -28,7 +28,7 @@ class Marks {
   Result<std::size_t> number_of(const std::string& name, bool is_return) const;
   wire::SharedBytes list() const;
 
-  Room& room_;
+  SessionContext& session_;
   std::optional<std::uint64_t> last_ns_;
   std::array<std::string, hands::kMostMarks> names_;
   std::array<bool, hands::kMostMarks> is_set_{};

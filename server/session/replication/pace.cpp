@@ -10,14 +10,14 @@ constexpr const char* kOwnPace = "not done: this session keeps its own pace";
 }  // namespace
 
 std::string Pace::slow(float rate, const std::string& by) {
-  if (!room_.options.on_pace) return kOwnPace;
+  if (!session_.options.on_pace) return kOwnPace;
   rate_ = rate;
   tell(by);
   return {};
 }
 
 std::string Pace::pause(bool pauses, const std::string& by) {
-  if (!room_.options.on_pace) return kOwnPace;
+  if (!session_.options.on_pace) return kOwnPace;
   if (pauses == is_paused_)
     return pauses ? "not done: it is paused already" : "not done: it goes on already";
   is_paused_ = pauses;
@@ -33,21 +33,21 @@ void Pace::reset() {
 }
 
 bool Pace::show(const Speaker& newcomer) const {
-  return (is_usual() && by_.empty()) || room_.audience.send(newcomer, message());
+  return (is_usual() && by_.empty()) || session_.audience.send(newcomer, message());
 }
 
 // Hands move on while time stands still: their tools go back to them as after a freeze.
 void Pace::tell(const std::string& by) {
   by_ = by;
-  for (const auto& who : room_.roster.list()) {
+  for (const auto& who : session_.roster.list()) {
     if (!who.slot.has_tools()) continue;
     if (is_paused_)
       held_.freeze(who.slot);
     else if (who.frozen_by.empty())
       held_.release(who.slot);
   }
-  room_.options.on_pace(is_paused_ ? 0 : rate_);
-  room_.audience.broadcast(message());
+  session_.options.on_pace(is_paused_ ? 0 : rate_);
+  session_.audience.broadcast(message());
 }
 
 wire::SharedBytes Pace::message() const {

@@ -10,7 +10,7 @@ namespace trocar::replication {
 
 class Pace {
  public:
-  Pace(Room& room, participants::HeldTools& held) : room_(room), held_(held) {}
+  Pace(SessionContext& session, participants::HeldTools& held) : session_(session), held_(held) {}
 
   bool is_paused() const { return is_paused_; }
   bool is_usual() const { return !is_paused_ && rate_ == 1; }
@@ -27,7 +27,7 @@ class Pace {
   void tell(const std::string& by);
   wire::SharedBytes message() const;
 
-  Room& room_;
+  SessionContext& session_;
   participants::HeldTools& held_;
   float rate_ = 1;  // of time, before it was paused
   bool is_paused_ = false;

@@ -66,13 +66,13 @@ Replicator::Replicator(net::Connections& connections, participants::SimulationIn
       layout_(std::move(layout)),
       roster_(options_.places),
       absences_(options_.return_seconds),
-      room_{options_, *this, roster_, inbox_},
-      hands_(room_, counters_),
-      marks_(room_),
-      pace_(room_, hands_.held()),
-      drawing_(room_),
-      course_(room_),
-      teaching_(room_, door_, hands_, pace_, drawing_) {}
+      session_{options_, *this, roster_, inbox_},
+      hands_(session_, counters_),
+      marks_(session_),
+      pace_(session_, hands_.held()),
+      drawing_(session_),
+      course_(session_),
+      teaching_(session_, door_, hands_, pace_, drawing_) {}
 
 Replicator::~Replicator() = default;
 
@@ -147,7 +147,7 @@ void Replicator::leave(Client& client) {
     hands_.held().forget(slot);
     if (slot.has_tools()) inbox_.push_leave(slot);
     if (wire::rights_of(client.participant->role).may_teach) teaching_.release_unless_led();
-    room_.has_changed = true;
+    session_.has_changed = true;
   }
 }
 
@@ -159,20 +159,20 @@ void Replicator::forget(Client& client) {
 void Replicator::settle_participants() {
   const auto now = options_.clock_ns();
   do {  // somebody may drop out while being told
-    if (room_.has_changed) {
-      room_.has_changed = false;
-      room_.is_told = false;
+    if (session_.has_changed) {
+      session_.has_changed = false;
+      session_.is_told = false;
       if (options_.on_participants) options_.on_participants(roster_.list(), newest_tick());
     }
     tell_participants(now);
-  } while (room_.has_changed);
+  } while (session_.has_changed);
 }
 
 void Replicator::tell_participants(std::uint64_t now_ns) {
   const bool is_early =
       participants_told_ns_ && now_ns - *participants_told_ns_ < options_.participants_interval_ns;
-  if (room_.is_told || is_early) return;
-  room_.is_told = true;
+  if (session_.is_told || is_early) return;
+  session_.is_told = true;
   participants_told_ns_ = now_ns;
   broadcast(encode_participants(roster_.list(), door_.is_closed(), door_.waiting()));
 }
@@ -180,7 +180,7 @@ void Replicator::tell_participants(std::uint64_t now_ns) {
 void Replicator::end_all(EndReason reason, const std::string& text) {
   while (!clients_.empty()) end_session(*clients_.begin()->second, {reason, text});
   end_absences(std::numeric_limits<std::uint64_t>::max());
-  room_.has_changed = false;
+  session_.has_changed = false;
 }
 
 // ---- what they say ----
@@ -315,7 +315,7 @@ std::optional<Ending> Replicator::admit(Client& client, const proto::Hello& hell
   }
   if (participants::is_valid_name(request->name))
     if (const auto wait = door_.check(client.applicant)) {
-      room_.is_told = false;  // it is seen who waits
+      session_.is_told = false;  // it is seen who waits
       return Ending{EndReason::Closed, *wait};
     }
   if (auto ending = find_place(client, *request)) return ending;
@@ -377,7 +377,7 @@ std::optional<Ending> Replicator::welcome(Client& client) {
     for (const auto& law : options_.haptic_laws)
       if (!send(client, encode_haptic_law(law))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
-  room_.has_changed = true;
+  session_.has_changed = true;
   return std::nullopt;
 }
 

@@ -22,8 +22,8 @@
 // claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
 // does not fit, the session ends as too slow.
 //
-// What people say goes to the part that it is for: hands.h, teaching.h, marks.h, drawing.h,
-// lesson_course.h. They speak to people through Audience, which this is.
+// A message goes to the part that it is for: hands.h, teaching.h, marks.h, drawing.h,
+// lesson_course.h. Parts speak to people through Audience, which this is.
 //
 // Guests of a carrier (server/watch/crowd) are let in as anybody is; what is for everybody goes
 // to the carrier once instead of to each of them.
@@ -199,7 +199,7 @@ class Replicator final : public net::ConnectionHandler, private Audience {
   std::uint64_t recording_told_ns_ = 0;
   ReplicatorCounters counters_;
   access::Door door_;
-  Room room_;
+  SessionContext session_;
   Hands hands_;
   Marks marks_;
   Pace pace_;

@@ -48,7 +48,7 @@ std::optional<Ending> Replicator::handle_relay_report(Client& client,
   if (!client.reports.take(1, options_.clock_ns()))
     return Ending{EndReason::ProtocolError, "RelayReport: more than one in a second"};
   roster_.set_relayed(client.participant->slot, report.watchers());
-  room_.is_told = false;  // the recording does not need it
+  session_.is_told = false;  // the recording does not need it
   return std::nullopt;
 }
 

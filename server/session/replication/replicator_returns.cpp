@@ -17,7 +17,7 @@ bool Replicator::keep_place(Client& client) {
   ++counters_.lost;
   if (options_.gate) options_.gate->note_action(client.applicant, "lost");
   roster_.set_away(slot, true);
-  room_.has_changed = true;
+  session_.has_changed = true;
   away_[slot] = std::move(clients_.extract(client.id).mapped());
   return true;
 }
@@ -35,7 +35,7 @@ bool Replicator::restore(participants::Participant who, const participants::Retu
   if (slot.has_tools()) inbox_.note_hand();
   roster_.restore(std::move(who));
   away_[slot] = std::move(client);
-  room_.has_changed = true;
+  session_.has_changed = true;
   return true;
 }
 

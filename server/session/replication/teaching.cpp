@@ -93,12 +93,12 @@ std::optional<Ending> Teaching::order(Speaker& who, const proto::TeachRequest& r
   const auto refuse = [&](const std::string& why) {
     proto::Envelope answer;
     describe(*order, slot, false, why, *answer.mutable_teach_event());
-    room_.audience.send(who, wire::encode_envelope(answer));
+    session_.audience.send(who, wire::encode_envelope(answer));
     return std::nullopt;
   };
-  if (!who.sayings.take(is_chat ? 1 : 0.25, room_.now_ns()))
+  if (!who.sayings.take(is_chat ? 1 : 0.25, session_.now_ns()))
     return refuse("not done: at most one line a second, or four other requests");
-  const auto* whom = room_.roster.find(order->participant);
+  const auto* whom = session_.roster.find(order->participant);
   if (is_about_one(order->action) && (whom == nullptr || whom->name != order->name))
     return refuse("not done: " + printable(order->name, 32) + " is not here any more");
   std::optional<ToolSlot> received;
@@ -115,7 +115,8 @@ std::optional<Ending> Teaching::order(Speaker& who, const proto::TeachRequest& r
   if (!why.empty()) return refuse(why);
   if (!is_chat) {
     log::info("{}", words);
-    if (auto* gate = room_.options.gate) gate->note_action(who.applicant, name_of(order->action));
+    if (auto* gate = session_.options.gate)
+      gate->note_action(who.applicant, name_of(order->action));
   }
   proto::LessonRecord record;
   describe(*order, slot, true, words, *record.mutable_teach());
@@ -125,17 +126,17 @@ std::optional<Ending> Teaching::order(Speaker& who, const proto::TeachRequest& r
   }
   proto::Envelope event;
   *event.mutable_teach_event() = record.teach();
-  room_.record(wire::LessonKind::Said, record);
-  room_.audience.broadcast(wire::encode_envelope(event));
+  session_.record(wire::LessonKind::Said, record);
+  session_.audience.broadcast(wire::encode_envelope(event));
   // Telling people may have ended anybody's session: `who` is not used from here on.
-  if (order->action == TeachAction::Expel) room_.audience.put_out(order->participant, words);
+  if (order->action == TeachAction::Expel) session_.audience.put_out(order->participant, words);
   if (order->action == TeachAction::Wipe) drawing_.wipe();
   return std::nullopt;
 }
 
 void Teaching::describe(const TeachOrder& order, ParticipantSlot by, bool is_done,
                         const std::string& text, proto::TeachEvent& message) const {
-  message.set_tick(room_.audience.newest_tick());
+  message.set_tick(session_.audience.newest_tick());
   message.set_action(static_cast<proto::TeachAction>(order.action));
   message.set_by(by.value);
   if (is_about_one(order.action)) message.set_participant(order.participant.value);
@@ -147,7 +148,7 @@ void Teaching::describe(const TeachOrder& order, ParticipantSlot by, bool is_don
 // be skipped, is left to do once everybody is told.
 std::string Teaching::carry_out(const TeachOrder& order, const Speaker& who,
                                 const std::string& words) {
-  auto& roster = room_.roster;
+  auto& roster = session_.roster;
   const auto& by = who.participant->name;
   const auto* whom = roster.find(order.participant);
   const auto whose_tools = [&](const char* lacks) {
@@ -160,7 +161,7 @@ std::string Teaching::carry_out(const TeachOrder& order, const Speaker& who,
       const bool freezes = order.action == TeachAction::Freeze;
       freezes ? hands_.held().freeze(whom->slot) : hands_.held().release(whom->slot);
       roster.set_frozen_by(whom->slot, freezes ? by : std::string());
-      room_.has_changed = true;
+      session_.has_changed = true;
       return {};
     }
     case TeachAction::TakeClaim:
@@ -169,34 +170,34 @@ std::string Teaching::carry_out(const TeachOrder& order, const Speaker& who,
       return {};
     case TeachAction::Expel:
       if (wire::rights_of(whom->role).may_teach) return "not done: nobody puts out an instructor";
-      door_.put_out(room_.audience.find(whom->slot)->applicant);
+      door_.put_out(session_.audience.find(whom->slot)->applicant);
       return {};
     case TeachAction::Rename: {
       if (const auto renamed = roster.rename(order.participant, order.text); !renamed)
         return "not done: " + renamed.error().message;
-      if (auto* renamed = room_.audience.find(order.participant))
+      if (auto* renamed = session_.audience.find(order.participant))
         renamed->participant->name = order.text;
-      room_.has_changed = true;
+      session_.has_changed = true;
       return {};
     }
     case TeachAction::Admit:
       if (!door_.admit(order.text)) return "not done: nobody called " + order.text + " waits";
-      room_.is_told = false;
+      session_.is_told = false;
       return {};
     case TeachAction::Close:
     case TeachAction::Open:
       door_.set_closed(order.action == TeachAction::Close);
-      room_.is_told = false;
+      session_.is_told = false;
       return {};
     case TeachAction::End:
-      if (!room_.options.on_end_wanted) return "not done: this session ends by itself";
-      room_.options.on_end_wanted(words);
+      if (!session_.options.on_end_wanted) return "not done: this session ends by itself";
+      session_.options.on_end_wanted(words);
       return {};
     case TeachAction::GiveView:
     case TeachAction::EndView:
       roster.set_leader(order.participant);
       drawing_.forget_view();
-      room_.has_changed = true;
+      session_.has_changed = true;
       return {};
     case TeachAction::Pause:
     case TeachAction::GoOn:
@@ -214,21 +215,21 @@ std::string Teaching::carry_out(const TeachOrder& order, const Speaker& who,
 }
 
 void Teaching::release_unless_led() {
-  const auto present = room_.roster.list();
+  const auto present = session_.roster.list();
   if (std::ranges::any_of(present,
                           [](const auto& who) { return wire::rights_of(who.role).may_teach; }))
     return;
   for (const auto& who : present) {
     hands_.held().release(who.slot);
-    room_.roster.set_frozen_by(who.slot, {});
+    session_.roster.set_frozen_by(who.slot, {});
   }
   pace_.reset();
 }
 
 // Whoever gives may be away: it is what others can do for tissue that nobody's hand holds.
 Result<ToolSlot> Teaching::find_receiving_tool(const TeachOrder& order) const {
-  const auto* giver = room_.roster.find(order.participant);
-  const auto* receiver = room_.roster.find(order.receiver);
+  const auto* giver = session_.roster.find(order.participant);
+  const auto* receiver = session_.roster.find(order.receiver);
   if (giver == nullptr || receiver == nullptr || receiver->name != order.receiver_name)
     return cannot(printable(order.receiver_name, 32) + " is not here any more");
   if (giver->slot == receiver->slot) return cannot(giver->name + " has it already");
@@ -239,7 +240,7 @@ Result<ToolSlot> Teaching::find_receiving_tool(const TeachOrder& order) const {
   if (receiver->is_away) return cannot(receiver->name + " has lost the connection");
   if (!receiver->frozen_by.empty())
     return cannot("the tools of " + receiver->name + " are held still: release them first");
-  const auto& frame = room_.audience.newest_frame();
+  const auto& frame = session_.audience.newest_frame();
   if (find_tool(frame, tool_slot(giver->slot, order.tool)) == nullptr)
     return cannot("nobody has seen that instrument of " + giver->name + " yet");
   // The same hand is tried before the other.

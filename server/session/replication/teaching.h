@@ -16,8 +16,8 @@ namespace trocar::replication {
 
 class Teaching {
  public:
-  Teaching(Room& room, access::Door& door, Hands& hands, Pace& pace, Drawing& drawing)
-      : room_(room), door_(door), hands_(hands), pace_(pace), drawing_(drawing) {}
+  Teaching(SessionContext& session, access::Door& door, Hands& hands, Pace& pace, Drawing& drawing)
+      : session_(session), door_(door), hands_(hands), pace_(pace), drawing_(drawing) {}
 
   // Carries out an order of an instructor, or says a line; everybody is told.
   std::optional<Ending> order(Speaker& who, const proto::TeachRequest& request);
@@ -32,7 +32,7 @@ class Teaching {
   void describe(const TeachOrder& order, ParticipantSlot by, bool is_done, const std::string& text,
                 proto::TeachEvent& message) const;
 
-  Room& room_;
+  SessionContext& session_;
   access::Door& door_;
   Hands& hands_;
   Pace& pace_;

@@ -33,6 +33,12 @@ inline constexpr float kMaxQuaternionError = 1e-3f;
 using wire::EndReason;
 using wire::kEndReasonCount;
 
+// The session of one client ends so: with a Goodbye that says why.
+struct Ending {
+  EndReason reason = EndReason::Unspecified;
+  std::string text;
+};
+
 struct HelloRequest {
   std::uint32_t protocol_minor = 0;
   std::string name;  // not yet checked: the roster does

@@ -99,10 +99,7 @@ class Crowd final : public net::ConnectionHandler {
 
  private:
   struct Watcher;
-  struct Ending {
-    replication::EndReason reason;
-    std::string text;
-  };
+  using Ending = replication::Ending;
 
   std::optional<Ending> handle_message(Watcher& watcher, BytesView bytes);
   std::optional<Ending> handle_datagram(Watcher& watcher, const proto::ClientDatagram& datagram);

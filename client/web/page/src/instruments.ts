@@ -1,4 +1,4 @@
-// What is beside the organ in the picture: instruments with their arrows, pointers, and the drawing
+// These are drawn beside the organ: instruments with their arrows, pointers, and the drawing
 // on the organ.
 
 import {

@@ -40,7 +40,7 @@ const kPingMs = 1000,
 // yet.
 const kJoinSilenceMs = 15_000,
   kJoinTries = 4;
-// What the replica alone reads: the page does not parse such messages.
+// The replica alone reads such messages: the page does not parse them.
 const kOfReplica: MessageName[] = [
   'surfaceFrame',
   'frameState',
@@ -168,7 +168,7 @@ export class Session {
       }),
     });
   }
-  // Where this person's view is, which others follow.
+  // Says where this person's view is, which others follow.
   view(eye: Vec3, target: Vec3): void {
     const place = (v: Vec3) => create(Vec3Schema, { x: v[0], y: v[1], z: v[2] });
     this.say({

@@ -1,5 +1,5 @@
-// What tools did over time, in bins: force, tip, way, what they held. It is filled from the
-// overview of a recording, or from its frames, in whatever order they are played.
+// A course is what tools did over time, in bins: force, tip, way, what they held. It is filled from
+// the overview of a recording, or from its frames, in whatever order they are played.
 
 import type { Overview } from '../gen/proto/journal_pb';
 import type { FrameState, Vec3 as WireVec3 } from '../gen/proto/wire_pb';

@@ -100,8 +100,8 @@ function sharesIn(p: Vec3, a: Vec3, b: Vec3, c: Vec3): Vec3 {
 // Along straight lines from place to place, m.
 export const lengthOf = (places: Vec3[]): number =>
   places.slice(1).reduce((sum, p, i) => sum + distance(p, places[i] ?? p), 0);
-// Of the polygon with these corners, m2: that which its shadow has on the plane that shows it
-// largest.
+// Returns the area of the polygon with these corners, m2: that of its shadow on the plane that
+// shows it largest.
 export function areaOf(places: Vec3[]): number {
   const sum: Vec3 = [0, 0, 0],
     first = places[0];
