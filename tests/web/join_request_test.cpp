@@ -4,6 +4,7 @@
 
 #include "common/secure/join_code.h"
 #include "proto/wire.pb.h"
+#include "server/watch/page/page_messages.h"
 
 namespace trocar::page {
 namespace {
@@ -29,11 +30,38 @@ TEST(JoinRequest, BecomesAHello) {
   EXPECT_EQ(envelope.hello().tool_size(), 0);
 }
 
+TEST(JoinRequest, OfASurgeonBringsInstruments) {
+  JoinRequest request;
+  const auto refusal = read(
+      R"({"code": "7K3M-9QXZ-4T2B-WN8C", "name": "Sue", "role": "surgeon", "tools": ["grasper", "scissors"]})",
+      request);
+  ASSERT_FALSE(refusal) << refusal->text;
+  const auto frame = hello_of(request);
+  proto::Envelope envelope;
+  ASSERT_TRUE(wire::decode_envelope(BytesView(*frame).subspan(wire::kHeaderBytes), envelope).ok());
+  EXPECT_EQ(envelope.hello().role(), proto::ROLE_SURGEON);
+  ASSERT_EQ(envelope.hello().tool_size(), 2);
+  EXPECT_EQ(envelope.hello().tool(0).form(), proto::TOOL_FORM_GRASPER);
+  EXPECT_EQ(envelope.hello().tool(1).form(), proto::TOOL_FORM_SCISSORS);
+}
+
+TEST(PageMessage, OfAToolIsForRolesThatMayHaveSome) {
+  proto::Envelope said, read;
+  said.mutable_tool_sample()->set_sequence(1);
+  const auto bytes = bytes_of(said.SerializeAsString());
+  for (const auto& role : wire::kRoles)
+    EXPECT_EQ(read_page_message(bytes, role.role, read), role.rights.may_have_tools) << role.name;
+}
+
 TEST(JoinRequest, OfAnotherFormIsRefused) {
   JoinRequest request;
   for (const auto* text :
        {"", "[]", "null", "{", "{\"name\": \"Ann\"}", "\xff\xfe", "{\"role\": 4}",
-        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "name": "Ann"})",
+        R"({"role": "root", "code": "7K3M-9QXZ-4T2B-WN8C", "name": "Ann"})",
+        R"({"role": "observer", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["probe"]})",
+        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["chainsaw"]})",
+        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": [1]})",
+        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["probe", "probe", "probe"]})",
         R"({"role": "observer", "code": "7K3M-9QXZ-4T2B-WN8C", "token": "00"})"}) {
     const auto refusal = read(text, request);
     ASSERT_TRUE(refusal) << text;

@@ -34,12 +34,44 @@ function extractShaders(headers, to) {
   fs.writeFileSync(to, lines.join('\n') + '\n');
 }
 
+// The table of instruments that the programs bring (common/tool/instruments.toml): tables of keys with
+// a text or a number.
+function extractInstruments(file, to) {
+  const forms = ['plain', 'probe', 'grasper', 'scissors', 'scalpel', 'hook', 'spatula'];
+  forms.push('endoscope', 'endoscope-30', 'suction', 'clipper', 'coagulator');
+  const tables = fs.readFileSync(file, 'utf8').split('[[instrument]]').slice(1);
+  const read = tables.map(table =>
+    Object.fromEntries(
+      [...table.matchAll(/^(\w+) = (?:"([^"]*)"|([\d.]+))$/gm)].map(m => [m[1], m[2] ?? Number(m[3])]),
+    ),
+  );
+  const metres = mm => mm * 1e-3;
+  const found = read.map(one => {
+    const form = forms.indexOf(one.form);
+    if (!one.name || form < 0) throw new Error(`${file}: an instrument has no name or no known form`);
+    return {
+      name: one.name,
+      text: one.text ?? '',
+      radiusM: metres(one.radius_mm ?? 5),
+      lengthM: metres(one.length_mm ?? 300),
+      reachM: metres(one.reach_mm ?? 10),
+      halfWidthM: metres(one.width_mm ?? 0) / 2,
+      friction: one.friction ?? 0.2,
+      gripN: one.grip_n ?? 0,
+      edgeM: metres(one.edge_mm ?? 0),
+      form,
+    };
+  });
+  fs.writeFileSync(to, `export const instruments = ${JSON.stringify(found, null, 1)};\n`);
+}
+
 fs.rmSync('src/gen', { recursive: true, force: true });
 fs.mkdirSync('src/gen', { recursive: true });
 extractShaders(
   ['shader_sources.h', 'field_source.h'].map(name => path.join(root, 'client/render', name)),
   'src/gen/shaders.ts',
 );
+extractInstruments(path.join(root, 'common/tool/instruments.toml'), 'src/gen/instruments.ts');
 execFileSync(
   'protoc',
   [

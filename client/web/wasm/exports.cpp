@@ -2,6 +2,7 @@
 // module's memory. A page has one model.
 
 #include "client/shape/noise.h"
+#include "client/web/wasm/page_hand.h"
 #include "client/web/wasm/page_model.h"
 
 #ifdef __wasm__
@@ -22,6 +23,11 @@ std::vector<std::uint8_t> noise_texels;
 PageModel& model() {
   static PageModel the_model;
   return the_model;
+}
+
+PageHands& hands() {
+  static PageHands the_hands;
+  return the_hands;
 }
 
 BytesView input_view(std::size_t bytes) {
@@ -230,6 +236,29 @@ TROCAR_EXPORT(pointers) std::size_t trocar_pointers() {
 }
 TROCAR_EXPORT(pointers_at) const void* trocar_pointers_at() {
   return model().pointers().data();
+}
+
+// These are of the hands of a person at the page, 0 right and 1 left.
+TROCAR_EXPORT(hand_take)
+void trocar_hand_take(int hand, float radius_m, float length_m, float half_width_m, float edge_m,
+                      float grip_n, std::uint32_t form) {
+  auto shape = shape_of(radius_m, length_m, half_width_m, edge_m, form);
+  shape.grip_n = grip_n;
+  hands().take(hand, shape);
+}
+// Floats of a PageHandInput, to be written before the two calls below.
+TROCAR_EXPORT(hand_input) void* trocar_hand_input() {
+  return &hands().input();
+}
+TROCAR_EXPORT(hand_switch) void trocar_hand_switch(int hand) {
+  hands().switch_to(hand);
+}
+TROCAR_EXPORT(hand_update) void trocar_hand_update(float seconds) {
+  hands().update(model().surface().positions(), model().surface().triangles(), seconds);
+}
+// Floats of a PageHandSample; null: the pointer was not over the picture yet.
+TROCAR_EXPORT(hand_sample) const void* trocar_hand_sample(int hand, double now_ms) {
+  return hands().sample(hand, now_ms);
 }
 
 TROCAR_EXPORT(lesson_target) const float* trocar_lesson_target() {

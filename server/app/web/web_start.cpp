@@ -149,7 +149,7 @@ std::string describe_links(const WebOptions& options, std::uint16_t port,
   for (std::size_t i = 0; i < options.sessions.size(); ++i) {
     const auto& session = options.sessions[i];
     const std::string which = i == 0 ? "" : "&session=" + session.name;
-    for (const auto* role : {"instructor", "observer"}) {
+    for (const auto* role : {"surgeon", "assistant", "instructor", "observer"}) {
       std::string code = "CODE";
       if (secure::is_loopback(session.host))
         if (const auto known = secure::read_link_file(session.port, role); known)

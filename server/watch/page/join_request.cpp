@@ -2,6 +2,7 @@
 
 #include "common/base/json.h"
 #include "common/secure/digest.h"
+#include "common/tool/instrument.h"
 #include "common/wire/session_messages.h"
 #include "proto/wire.pb.h"
 
@@ -9,10 +10,31 @@ namespace trocar::page {
 namespace {
 
 constexpr std::size_t kTokenBytes = 16;
+constexpr std::size_t kMostHands = 2;
 
 std::string text_at(const Json& json, const char* key) {
   const auto found = json.find(key);
   return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+wire::Role role_named(const std::string& name) {
+  for (const auto& known : wire::kRoles)
+    if (known.name == name) return known.role;
+  return wire::Role::Unknown;
+}
+
+// Fills the instruments by their names; false: one is unknown, or there are too many.
+bool read_tools(const Json& json, std::vector<tool::ToolShape>& tools) {
+  const auto found = json.find("tools");
+  if (found == json.end()) return true;
+  if (!found->is_array() || found->size() > kMostHands) return false;
+  for (const auto& name : *found) {
+    const auto* const known =
+        name.is_string() ? tool::find_instrument(name.get<std::string>()) : nullptr;
+    if (known == nullptr) return false;
+    tools.push_back(known->shape);
+  }
+  return true;
 }
 
 }  // namespace
@@ -28,13 +50,15 @@ std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& reques
   if (!json.is_object()) return no_request;
   request.name = text_at(json, "name");
   request.session = text_at(json, "session");
-  const auto role = text_at(json, "role");
-  if (role == "instructor")
-    request.role = wire::Role::Instructor;
-  else if (role == "observer")
-    request.role = wire::Role::Observer;
-  else
-    return JoinRefusal{JoinFault::Form, "a browser joins as instructor or observer"};
+  request.role = role_named(text_at(json, "role"));
+  if (request.role == wire::Role::Unknown)
+    return JoinRefusal{JoinFault::Form,
+                       "a browser joins as surgeon, assistant, instructor or observer"};
+  request.tools.clear();
+  if (!read_tools(json, request.tools) ||
+      (!request.tools.empty() && !wire::rights_of(request.role).may_have_tools))
+    return JoinRefusal{JoinFault::Form,
+                       "a surgeon or an assistant brings one or two instruments of the table"};
   if (const auto token = text_at(json, "token"); !token.empty()) {
     request.return_token = secure::from_hex(token);
     if (request.return_token.size() != kTokenBytes) return no_request;
@@ -49,7 +73,8 @@ wire::SharedBytes hello_of(const JoinRequest& request) {
   return wire::encode_hello({.name = request.name,
                              .role = request.role,
                              .join_secret = request.code.secret,
-                             .return_token = request.return_token});
+                             .return_token = request.return_token,
+                             .tools = request.tools});
 }
 
 }  // namespace trocar::page

@@ -4,7 +4,7 @@
 
 namespace trocar::page {
 
-bool read_page_message(BytesView bytes, proto::Envelope& message) {
+bool read_page_message(BytesView bytes, wire::Role role, proto::Envelope& message) {
   if (bytes.size() > wire::kMaxUpstreamBytes - wire::kHeaderBytes ||
       !wire::decode_envelope(bytes, message).ok())
     return false;
@@ -20,6 +20,9 @@ bool read_page_message(BytesView bytes, proto::Envelope& message) {
     case proto::Envelope::kLessonRequest:
     case proto::Envelope::kBye:
       return true;
+    case proto::Envelope::kToolSample:
+    case proto::Envelope::kToolChange:
+      return wire::rights_of(role).may_have_tools;
     default:
       return false;
   }

@@ -4,6 +4,7 @@
 
 #include "common/base/bytes.h"
 #include "common/wire/framing.h"
+#include "common/wire/role.h"
 
 namespace trocar::proto {
 class Envelope;
@@ -11,7 +12,7 @@ class Envelope;
 
 namespace trocar::page {
 
-// Decodes what a page has sent. False: it is none of the messages of one who holds no tools.
-bool read_page_message(BytesView envelope, proto::Envelope& message);
+// Decodes what a page has sent. False: it is none of the messages of that role.
+bool read_page_message(BytesView envelope, wire::Role role, proto::Envelope& message);
 
 }  // namespace trocar::page

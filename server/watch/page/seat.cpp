@@ -280,7 +280,7 @@ Seat::Verdict Seat::heed_ack(Frame frame) {
 
 Seat::Verdict Seat::heed(BytesView envelope) {
   proto::Envelope message;
-  if (!read_page_message(envelope, message)) return Verdict::Forbidden;
+  if (!read_page_message(envelope, wire::Role::Observer, message)) return Verdict::Forbidden;
   if (message.has_frame_ack()) return heed_ack(message.frame_ack().frame());
   if (message.has_keyframe_request()) {
     const auto now = monotonic_ns();

@@ -205,7 +205,7 @@ asio::awaitable<void> Watcher::relay_up() {
     }
     if (message.kind != BrowserMessage::Kind::Binary) break;
     proto::Envelope envelope;
-    if (!read_page_message(message.bytes, envelope)) {
+    if (!read_page_message(message.bytes, request_.role, envelope)) {
       why_ = "its page said something that a page may not say";
       break;
     }

@@ -1,20 +1,20 @@
 #pragma once
 
 // One person at a browser: he says who joins, and then either shares a connection to the session
-// with all who only watch (seat.h), or, as an instructor, who acts, has one of his own:
+// with all who only watch (seat.h), or, as one who leads or holds instruments, has one of his own:
 //
 //   browser --who joins--> Watcher --TLS, certificate against the code--> session
 //           <-- Envelopes, one at a time -- Watcher <-- frames ----------
-//           -- acknowledgements, pings, marks --> checked by kind --> session
+//           -- acknowledgements, marks, tools --> checked by kind --> session
 //
 // Nothing queues on the own connection. The next frame is read from the session when the browser's
 // socket has taken the one before, and the session sends what its acknowledgements say that the
 // browser can take: frames are skipped there, by their age, for this watcher alone.
 //
 // Bounds: one message each way, 16 MiB down and 64 KiB up; 5 s to say who joins, as many to reach
-// the session. What the browser may say is acknowledgements, pings, requests for keyframes, marks
-// and what belongs to a lesson; anything else ends its session. The server checks roles, as of
-// everybody.
+// the session. What the browser may say is acknowledgements, pings, requests for keyframes, marks,
+// what belongs to a lesson and, if its role has tools, where these are; anything else ends its
+// session. The server checks roles, as of everybody.
 
 #include "common/base/asio.h"  // before Boost: see there
 

@@ -2,7 +2,7 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
-import type { LessonProgress, LessonStage } from './gen/proto/wire_pb';
+import { LessonGoal, type LessonProgress, type LessonStage } from './gen/proto/wire_pb';
 
 export interface Goal {
   stage: LessonStage;
@@ -79,10 +79,11 @@ function Results(props: { stage: LessonStage }): JSX.Element | null {
   );
 }
 
-// `lead`: what an instructor may do; nothing for others.
+// `lead`: what an instructor may do; `answer`: says that the place is found; nothing for others.
 export function LessonPanel(props: {
   goal: Goal;
   lead?: { next(): void; restart(): void };
+  answer?: () => void;
 }): JSX.Element {
   const { stage } = props.goal,
     { lead } = props;
@@ -104,6 +105,11 @@ export function LessonPanel(props: {
         )}
       </div>
       {!stage.isOver && <Progress goal={props.goal} />}
+      {props.answer && !stage.isOver && stage.goal === LessonGoal.FIND && (
+        <button class="main" onClick={props.answer} title="Touch the place first">
+          It is here
+        </button>
+      )}
       <Results stage={stage} />
       {lead && (
         <div class="row">

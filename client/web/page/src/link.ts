@@ -1,8 +1,13 @@
 // A link names session, role and code behind its #, which no browser sends to a server.
 
+export const kRoles = ['observer', 'surgeon', 'assistant', 'instructor'] as const;
+export type Role = (typeof kRoles)[number];
+// Whether one of that role holds instruments here.
+export const holdsTools = (role: Role): boolean => role === 'surgeon' || role === 'assistant';
+
 export interface Link {
   code: string; // empty: not given
-  role: 'instructor' | 'observer';
+  role: Role;
   name: string;
   session: string; // "HOST:PORT" of one of several; empty: the first
   recordingsKey: string;
@@ -38,7 +43,7 @@ export function readLink(hash: string): Link {
     speed = Number(given.get('speed') ?? 'none');
   return {
     code: given.get('join') === 'CODE' ? '' : (given.get('join') ?? ''),
-    role: given.get('role') === 'instructor' ? 'instructor' : 'observer',
+    role: kRoles.find(role => role === given.get('role')) ?? 'observer',
     name: given.get('name') ?? rememberedName(),
     session: given.get('session') ?? '',
     recordingsKey: given.get('recordings') ?? '',

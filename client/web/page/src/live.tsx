@@ -1,4 +1,4 @@
-// A session that runs: watch it, and as instructor mark the organ and return it.
+// A session that runs: watch it, hold instruments, or as instructor mark the organ and return it.
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
@@ -18,13 +18,15 @@ import { BloodPanel } from './blood';
 import { LessonPanel } from './goals';
 import { Marks, Pace } from './conduct';
 import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
-import type { Link } from './link';
+import { Hands, kFirst } from './hands';
+import { holdsTools, type Link } from './link';
 import { Events, ForcePlot, People } from './panels';
 import { changesOf, kindOf, kindOfTeaching, type EventKind, type RecordedEvent } from './recording';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
 import { Session } from './session';
 import { clock, forceOf, guideOf, Stage } from './stage';
+import { Tray } from './tray';
 
 const kPanelMs = 100,
   kShownTicks = 30_000,
@@ -48,6 +50,7 @@ export function Live(props: {
     isRecorded = useRef<boolean | null>(null),
     crc = useRef('');
   const picture = useRef<Picture | null>(null),
+    hands = useRef<Hands | null>(null),
     stage = useRef<LessonStage | null>(null),
     progress = useRef<LessonProgress | null>(null);
   const pace = useRef<SessionPace | null>(null),
@@ -83,6 +86,7 @@ export function Live(props: {
         for (const text of changesOf(list.current, value)) note(tick, 'people', text);
         list.current = value;
         people.current = [...value.participant].sort((a, b) => a.slot - b.slot);
+        hands.current?.heed(own.current, people.current);
       }
       if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
       if (kind === 'markEvent')
@@ -109,7 +113,12 @@ export function Live(props: {
       if (kind === 'barrier')
         crc.current = replica.ownCrc === value.surfaceCrc >>> 0 ? 'same' : 'other';
     };
-    return new Session(props.link, replica, { onMessage, onChange: () => redraw(n => n + 1) });
+    return new Session(
+      props.link,
+      replica,
+      { onMessage, onChange: () => redraw(n => n + 1) },
+      holdsTools(props.link.role) ? kFirst : [],
+    );
   }, []);
 
   useEffect(() => {
@@ -121,6 +130,7 @@ export function Live(props: {
     }, kPanelMs);
     return () => {
       window.clearInterval(timer);
+      hands.current?.dispose();
       session.leave();
     };
   }, []);
@@ -130,7 +140,7 @@ export function Live(props: {
   // Tests and curious people read figures here.
   useEffect(() => {
     Object.assign(window, {
-      trocar: { replica, session, picture: () => picture.current, barrier: () => crc.current },
+      trocar: { replica, session, hands: () => hands.current, picture: () => picture.current, barrier: () => crc.current },
     });
   }, []);
 
@@ -208,6 +218,9 @@ export function Live(props: {
           onPicture={() => undefined}
           onReady={p => {
             picture.current = p;
+            if (!holdsTools(props.link.role)) return;
+            hands.current = new Hands(replica, session, p, () => redraw(n => n + 1));
+            hands.current.heed(own.current, people.current);
           }}
           tools={
             session.state === 'live' && (
@@ -242,6 +255,13 @@ export function Live(props: {
         {asks !== null && <Ask key={asks.title} question={asks} onDone={() => setAsks(null)} />}
       </main>
       <aside>
+        {hands.current && (
+          <Tray
+            hands={hands.current}
+            tools={replica.tools().filter(tool => tool.slot >> 1 === own.current)}
+            onDone={() => picture.current?.canvas.focus({ preventScroll: true })}
+          />
+        )}
         {stage.current && (
           <LessonPanel
             goal={{
@@ -250,6 +270,12 @@ export function Live(props: {
               seconds: progress.current?.seconds ?? 0,
             }}
             {...(mayMark ? { lead } : {})}
+            {...(hands.current
+              ? {
+                  answer: () =>
+                    session.lead(LessonAction.LESSON_ANSWER, hands.current?.moved ?? 0),
+                }
+              : {})}
           />
         )}
         <BloodPanel blood={replica.blood()} />

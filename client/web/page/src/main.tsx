@@ -5,10 +5,17 @@ import { useEffect, useState } from 'preact/hooks';
 import 'uplot/dist/uPlot.min.css';
 import './page.css';
 import { Debrief, RecordingList } from './debrief';
-import { nameFault, readLink, rememberName, type Link } from './link';
+import { kRoles, nameFault, readLink, rememberName, type Link, type Role } from './link';
 import { Live } from './live';
 import { ofFile, overHttp, Recording } from './recording';
 import { Replica } from './replica';
+
+const kRoleText: Record<Role, string> = {
+  observer: 'an observer: you watch',
+  surgeon: 'a surgeon: you hold instruments',
+  assistant: 'an assistant: you hold instruments, and give way to surgeons',
+  instructor: 'an instructor: you watch and lead the lesson',
+};
 
 type Where =
   | { is: 'start'; why: string }
@@ -44,7 +51,7 @@ function Start(props: {
   return (
     <main>
       <form class="sheet" onSubmit={submit}>
-        <h1>Watch a session</h1>
+        <h1>Join a session</h1>
         {props.why && (
           <p class="fault" role="alert">
             {props.why}
@@ -74,7 +81,7 @@ function Start(props: {
         </label>
         <fieldset>
           <legend>You are</legend>
-          {(['observer', 'instructor'] as const).map(kind => (
+          {kRoles.map(kind => (
             <label key={kind} class="radio">
               <input
                 type="radio"
@@ -83,9 +90,7 @@ function Start(props: {
                 checked={role === kind}
                 onChange={() => setRole(kind)}
               />
-              {kind === 'observer'
-                ? 'an observer: you watch'
-                : 'an instructor: you watch and lead the lesson'}
+              {kRoleText[kind]}
             </label>
           ))}
         </fieldset>
@@ -94,7 +99,7 @@ function Start(props: {
             {fault}
           </p>
         )}
-        <button class="main">Watch</button>
+        <button class="main">Join</button>
         <hr />
         <label class="drop">
           Or open a recording: drop a file here, or choose one

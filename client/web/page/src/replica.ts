@@ -59,6 +59,19 @@ interface Exports {
   pointers(): number;
   pointers_at(): number;
   pointer_colour(slot: number): number;
+  hand_take(
+    hand: number,
+    radiusM: number,
+    lengthM: number,
+    halfWidthM: number,
+    edgeM: number,
+    gripN: number,
+    form: number,
+  ): void;
+  hand_input(): number;
+  hand_switch(hand: number): void;
+  hand_update(seconds: number): void;
+  hand_sample(hand: number, nowMs: number): number;
   lesson_target(): number;
   drawing_at(): number;
   attach(x: number, y: number, z: number): number;
@@ -148,6 +161,41 @@ export interface Lens {
   up: Vec3;
   tanHalfHeight: number;
   isEndoscope: boolean;
+}
+// Where a hand has its tool, and what it asks of it; isDue: the session is to be told.
+export interface HandSample {
+  isDue: boolean;
+  verb: Verb;
+  tip: Vec3; // m
+  orientation: [number, number, number, number];
+}
+// How the picture lies in the world: m and unit vectors, and its size in pixels.
+export interface Rays {
+  eye: Vec3;
+  right: Vec3;
+  up: Vec3;
+  forward: Vec3;
+  tanHalfHeight: number;
+  width: number;
+  height: number;
+}
+// What mouse and keys do now.
+export interface HandInput {
+  x: number; // pixels of the picture
+  y: number;
+  wheel: number; // notches, away from the person positive
+  isOverScene: boolean;
+  left: boolean;
+  camera: boolean; // the mouse moves the view
+  shift: boolean;
+  control: boolean;
+  push: boolean;
+  grasp: boolean;
+  cut: boolean;
+  deeper: boolean;
+  nearer: boolean;
+  rollLeft: boolean;
+  rollRight: boolean;
 }
 // What an instrument looks like is made from this.
 export interface Shape {
@@ -388,6 +436,44 @@ export class Replica {
     return this.e.pointer_colour(slot) >>> 0;
   }
 
+  // The hand, 0 right and 1 left, has that instrument, and lets go.
+  takeInHand(hand: number, shape: Shape & { gripN: number }): void {
+    const { radiusM, lengthM, halfWidthM, edgeM, gripN, form } = shape;
+    this.e.hand_take(hand, radiusM, lengthM, halfWidthM, edgeM, gripN, form);
+  }
+  // Mouse and keys move that hand.
+  moveHand(hand: number, rays: Rays, input: HandInput, seconds: number): void {
+    const { eye, right, up, forward, tanHalfHeight, width, height } = rays,
+      { x, y, wheel } = input;
+    const flags = [
+      input.isOverScene,
+      input.left,
+      input.camera,
+      input.shift,
+      input.control,
+      input.push,
+      input.grasp,
+      input.cut,
+      input.deeper,
+      input.nearer,
+      input.rollLeft,
+      input.rollRight,
+    ].map(Number);
+    const all = [...eye, ...right, ...up, ...forward, tanHalfHeight, width, height, x, y, wheel];
+    this.floats(this.e.hand_input(), all.length + flags.length).set([...all, ...flags]);
+    this.e.hand_switch(hand);
+    this.e.hand_update(seconds);
+  }
+  // Null: the pointer was not over the picture yet.
+  handSample(hand: number, nowMs: number): HandSample | null {
+    const at = this.e.hand_sample(hand, nowMs);
+    if (at === 0) return null;
+    const [isDue = 0, verb = 0, x = 0, y = 0, z = 0, qx = 0, qy = 0, qz = 0, qw = 1] = this.floats(
+      at,
+      9,
+    );
+    return { isDue: isDue > 0, verb, tip: [x, y, z], orientation: [qx, qy, qz, qw] };
+  }
   // Returns the point that a lesson's hands follow; null: there is none.
   lessonTarget(): Vec3 | null {
     const at = this.e.lesson_target();

@@ -9,10 +9,12 @@ import {
   LinearFilter,
   Matrix4,
   Mesh,
+  MOUSE,
   RawShaderMaterial,
   Raycaster,
   RepeatWrapping,
   Scene,
+  TOUCH,
   Vector2,
   Vector3,
   Vector4,
@@ -27,7 +29,7 @@ import { Field } from './field';
 import { FineLayer } from './fine';
 import { Instruments, kShadows, type Guide } from './instruments';
 import { Pane, partsOf, type Part, type ViewCount } from './pane';
-import { Overlay, type Replica, type Vec3 } from './replica';
+import { Overlay, type Rays, type Replica, type Tool, type Vec3 } from './replica';
 
 // A place of the surface: shares of the corners of a triangle, which are numbers of vertices.
 export interface SurfacePlace {
@@ -54,6 +56,8 @@ export class Picture {
   onLetGo: (view: number) => void = () => undefined;
   onTurn: () => void = () => undefined; // the person moves the first view, whatever it follows
   onActive: (view: number) => void = () => undefined; // another one is moved from now on
+  // The session's tools, with one's own where the hand has them now.
+  asHeld: (tools: Tool[]) => Tool[] = tools => tools;
   pictures = 0;
   drawMs = 0; // the last picture took so long
   private readonly renderer: WebGLRenderer;
@@ -266,7 +270,7 @@ export class Picture {
     this.lastMs = nowMs;
     if (this.replica.geometryVersion !== this.version) this.loadGeometry();
     this.loadPositions();
-    const tools = this.replica.tools(),
+    const tools = this.asHeld(this.replica.tools()),
       shown = this.panes.slice(0, this.count);
     for (const pane of shown) {
       if (!pane.isFramed) this.frame(pane);
@@ -308,6 +312,43 @@ export class Picture {
     this.pictures++;
     this.drawMs = performance.now() - begin;
     return true;
+  }
+
+  // The left button, one finger and the wheel are for instruments; the right button and two fingers
+  // move the view.
+  set holdsTools(value: boolean) {
+    const { controls } = this;
+    controls.mouseButtons = value
+      ? { MIDDLE: MOUSE.PAN, RIGHT: MOUSE.ROTATE }
+      : { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
+    controls.touches = value
+      ? { TWO: TOUCH.DOLLY_ROTATE }
+      : { ONE: TOUCH.ROTATE, TWO: TOUCH.DOLLY_PAN };
+    controls.enableZoom = !value;
+  }
+  // How the first view lies in the world, with its part of the canvas, in shares.
+  rays(): { rays: Rays; part: Part } {
+    const camera = this.main.drawn,
+      part = this.main.part;
+    camera.updateMatrixWorld();
+    const m = camera.matrixWorld.elements,
+      axis = (i: number, sign = 1): Vec3 => [
+        sign * (m[i] ?? 0),
+        sign * (m[i + 1] ?? 0),
+        sign * (m[i + 2] ?? 0),
+      ];
+    return {
+      rays: {
+        eye: [camera.position.x, camera.position.y, camera.position.z],
+        right: axis(0),
+        up: axis(4),
+        forward: axis(8, -1),
+        tanHalfHeight: Math.tan((camera.fov * Math.PI) / 360),
+        width: this.width * part[2],
+        height: this.height * part[3],
+      },
+      part,
+    };
   }
 
   // Dragging turns the view, unless it points.

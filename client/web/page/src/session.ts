@@ -11,16 +11,20 @@ import {
   StrokeRequestSchema,
   TeachAction,
   TeachRequestSchema,
+  ToolChangeSchema,
+  ToolSampleSchema,
   Vec3Schema,
   ViewRequestSchema,
   type Envelope,
   type LessonAction,
   type MarkAction,
   type Participant,
+  type ToolShape,
+  type Verb,
 } from './gen/proto/wire_pb';
 import { firstNumber, numberOf, type MessageName } from './envelope';
 import type { Link } from './link';
-import type { Replica, Vec3 } from './replica';
+import type { HandSample, Replica, Vec3 } from './replica';
 
 export type State = 'joining' | 'live' | 'away' | 'ended';
 export interface View {
@@ -75,11 +79,13 @@ export class Session {
   private retryMs = 200;
   private joinTries = 0;
   private hasLeft = false;
+  private samples = 0;
 
   constructor(
     private readonly link: Link,
     private readonly replica: Replica,
     private readonly hooks: Hooks,
+    private readonly tools: string[] = [], // names of the instruments that one joins with
   ) {
     this.connect();
     this.timer = window.setInterval(() => this.tick(), kPingMs);
@@ -147,9 +153,9 @@ export class Session {
       }),
     });
   }
-  // Goes on in the lesson, or back to its beginning.
-  lead(action: LessonAction): void {
-    this.say({ case: 'lessonRequest', value: create(LessonRequestSchema, { action }) });
+  // Goes on in the lesson, or back to its beginning, or answers with a tool, 0 or 1.
+  lead(action: LessonAction, tool = 0): void {
+    this.say({ case: 'lessonRequest', value: create(LessonRequestSchema, { action, tool }) });
   }
   // Lets simulated time go so fast, as a share of real time.
   slow(rate: number): void {
@@ -167,6 +173,25 @@ export class Session {
         weight: points.flatMap(p => p.weights),
       }),
     });
+  }
+  // Says where a hand has its tool, 0 or 1, and what it asks of it. No force comes back here.
+  sample(tool: number, hand: HandSample): void {
+    const [x, y, z] = hand.tip,
+      [qx, qy, qz, qw] = hand.orientation;
+    this.say({
+      case: 'toolSample',
+      value: create(ToolSampleSchema, {
+        tool,
+        sequence: ++this.samples,
+        positionM: { x, y, z },
+        orientation: { x: qx, y: qy, z: qz, w: qw },
+        verb: hand.verb as number as Verb,
+      }),
+    });
+  }
+  // The hand takes another instrument.
+  change(tool: number, shape: ToolShape): void {
+    this.say({ case: 'toolChange', value: create(ToolChangeSchema, { tool, shape }) });
   }
   // Says where this person's view is, which others follow.
   view(eye: Vec3, target: Vec3): void {
@@ -203,7 +228,10 @@ export class Session {
     this.heardMs = performance.now();
     socket.onopen = () => {
       const { code, name, role, session } = this.link;
-      socket.send(JSON.stringify({ code, name, role, session, token: this.token }));
+      const { token, tools } = this;
+      socket.send(
+        JSON.stringify({ code, name, role, session, token, ...(tools.length > 0 ? { tools } : {}) }),
+      );
     };
     socket.onmessage = event => {
       if (socket === this.socket && event.data instanceof ArrayBuffer)
