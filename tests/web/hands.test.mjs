@@ -121,6 +121,22 @@ test('one finger holds and lifts, two turn the view', async () => {
   await touching.close();
 });
 
+test('keys alone bring an instrument to the organ and press it', async () => {
+  const { page, slot } = await surgeon('Kay');
+  await page.keyboard.down('k');
+  await sleep(200);
+  await page.keyboard.up('k');
+  await until('a tool over the organ', () => toolOf(page, slot));
+  await page.keyboard.down('f');
+  await until('a force', async () => {
+    const tool = await toolOf(page, slot);
+    return tool.contactNodes > 0 && Math.hypot(...tool.forceN) > 0.02;
+  });
+  await page.keyboard.up('f');
+  assert.deepEqual(page.faults, []);
+  await close(page);
+});
+
 test('the recording of it verifies', async () => {
   world.server.kill('SIGINT');
   await world.server.ended;

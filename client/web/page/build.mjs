@@ -42,13 +42,17 @@ function extractInstruments(file, to) {
   const tables = fs.readFileSync(file, 'utf8').split('[[instrument]]').slice(1);
   const read = tables.map(table =>
     Object.fromEntries(
-      [...table.matchAll(/^(\w+) = (?:"([^"]*)"|([\d.]+))$/gm)].map(m => [m[1], m[2] ?? Number(m[3])]),
+      [...table.matchAll(/^(\w+) = (?:"([^"]*)"|([\d.]+))$/gm)].map(m => [
+        m[1],
+        m[2] ?? Number(m[3]),
+      ]),
     ),
   );
   const metres = mm => mm * 1e-3;
   const found = read.map(one => {
     const form = forms.indexOf(one.form);
-    if (!one.name || form < 0) throw new Error(`${file}: an instrument has no name or no known form`);
+    if (!one.name || form < 0)
+      throw new Error(`${file}: an instrument has no name or no known form`);
     return {
       name: one.name,
       text: one.text ?? '',

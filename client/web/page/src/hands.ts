@@ -4,6 +4,7 @@
 //   left button, one finger   what the instrument is for      wheel, W and S   deeper, nearer
 //   F, Space, X               push, grasp, cut                Q and E          turn it
 //   Tab over the picture, H   the other hand                  1 to 9           another instrument
+//   I, J, K, L                up, left, down, right, for whoever has no mouse; Shift: a quarter
 //
 // Samples leave as often as the window's, also while nothing is drawn. A page that is hidden lets go
 // of everything, and says so: its browser would soon call it too rarely to hold anything.
@@ -20,6 +21,7 @@ export const kFirst = ['grasper', 'scalpel']; // names, of the right hand and th
 const kSampleMs = 8,
   kWheelPixels = 100, // a notch
   kMostSeconds = 0.1, // between two moves: a page that stood still does not jump
+  kStepPixels = 160, // a second
   kComesMs = 300; // a tip that was elsewhere comes to where a finger, or a first click, is
 
 const indexOf = (name: string): number => instruments.findIndex(one => one.name === name);
@@ -55,6 +57,12 @@ const kKeys: Record<string, keyof HandInput> = {
   q: 'rollLeft',
   e: 'rollRight',
 };
+const kSteps: Record<string, readonly [number, number]> = {
+  i: [0, -1],
+  j: [-1, 0],
+  k: [0, 1],
+  l: [1, 0],
+};
 const types = (target: EventTarget | null): boolean =>
   target instanceof HTMLElement && target.closest('input, textarea, select, button, a') !== null;
 
@@ -86,6 +94,7 @@ export class Hands {
     rollRight: false,
   };
   private usesFromMs: number | null = null; // from then on what is pressed counts
+  private readonly steps = new Set<string>(); // keys of kSteps that are held
   private readonly fingers = new Set<number>();
   private timer = 0;
   private lastMs = 0;
@@ -184,6 +193,7 @@ export class Hands {
       seconds = Math.min(kMostSeconds, (now - this.lastMs) / 1000);
     this.lastMs = now;
     if (this.session.state !== 'live' || this.replica.frames === 0 || document.hidden) return;
+    this.step(seconds);
     this.input.left = this.usesFromMs !== null && now >= this.usesFromMs;
     this.replica.moveHand(this.moved, this.picture.rays().rays, this.input, seconds);
     this.input.wheel = 0;
@@ -192,11 +202,32 @@ export class Hands {
       if (hand.sample?.isDue) this.session.sample(i, hand.sample);
     });
   }
+  // Keys move the pointer, from the middle at first.
+  private step(seconds: number): void {
+    if (this.steps.size === 0) return;
+    const { input } = this,
+      { width, height } = this.picture.rays().rays;
+    if (!input.isOverScene && !this.hands[this.moved]?.sample)
+      Object.assign(input, { x: width / 2, y: height / 2 });
+    const way = kStepPixels * seconds * (input.shift ? 0.25 : 1);
+    for (const key of this.steps) {
+      const [right, down] = kSteps[key] ?? [0, 0];
+      input.x = Math.max(0, Math.min(width - 1, input.x + right * way));
+      input.y = Math.max(0, Math.min(height - 1, input.y + down * way));
+    }
+    input.isOverScene = true;
+  }
+  // While a button is held, for fingers, which have no wheel: 1 deeper, -1 nearer, 0 neither.
+  goDeeper(way: number): void {
+    this.input.deeper = way > 0;
+    this.input.nearer = way < 0;
+  }
   private letGo(): void {
     this.usesFromMs = null;
     Object.assign(this.input, { camera: false, isOverScene: false });
     for (const key of Object.values(kKeys)) Object.assign(this.input, { [key]: false });
     this.fingers.clear();
+    this.steps.clear();
     this.hands.forEach((hand, i) => {
       const shape = instruments[hand.instrument];
       if (shape) this.hold(i, shape);
@@ -219,11 +250,15 @@ export class Hands {
     });
     on('contextmenu', event => event.preventDefault());
     canvas.addEventListener('wheel', event => this.roll(event), { signal, passive: false });
-    window.addEventListener('keydown', event => this.key(event, true), { signal });
-    window.addEventListener('keyup', event => this.key(event, false), { signal });
+    // Before the picture's own keys.
+    const first = { signal, capture: true };
+    window.addEventListener('keydown', event => this.key(event, true), first);
+    window.addEventListener('keyup', event => this.key(event, false), first);
     // Whatever is held elsewhere, nobody hears that it was let go.
     window.addEventListener('blur', () => this.letGo(), { signal });
-    document.addEventListener('visibilitychange', () => document.hidden && this.letGo(), { signal });
+    document.addEventListener('visibilitychange', () => document.hidden && this.letGo(), {
+      signal,
+    });
   }
   private follow(event: PointerEvent): void {
     const rect = (event.currentTarget as HTMLElement).getBoundingClientRect(),
@@ -270,10 +305,12 @@ export class Hands {
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key,
       held = kKeys[name];
     if (held !== undefined && !isDown) Object.assign(this.input, { [held]: false });
+    if (!isDown) this.steps.delete(name);
     if (event.ctrlKey || event.metaKey || event.altKey || types(event.target)) return;
     const isTab = name === 'Tab' && this.input.isOverScene && !event.shiftKey;
     const digit = /^[1-9]$/.test(name) ? Number(name) : 0;
     if (held !== undefined) Object.assign(this.input, { [held]: isDown });
+    else if (name in kSteps) isDown && this.steps.add(name);
     else if (!(isTab || name === 'h' || digit > 0)) return;
     event.preventDefault();
     event.stopPropagation();

@@ -140,7 +140,13 @@ export function Live(props: {
   // Tests and curious people read figures here.
   useEffect(() => {
     Object.assign(window, {
-      trocar: { replica, session, hands: () => hands.current, picture: () => picture.current, barrier: () => crc.current },
+      trocar: {
+        replica,
+        session,
+        hands: () => hands.current,
+        picture: () => picture.current,
+        barrier: () => crc.current,
+      },
     });
   }, []);
 
@@ -272,8 +278,7 @@ export function Live(props: {
             {...(mayMark ? { lead } : {})}
             {...(hands.current
               ? {
-                  answer: () =>
-                    session.lead(LessonAction.LESSON_ANSWER, hands.current?.moved ?? 0),
+                  answer: () => session.lead(LessonAction.LESSON_ANSWER, hands.current?.moved ?? 0),
                 }
               : {})}
           />

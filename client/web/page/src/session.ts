@@ -230,7 +230,14 @@ export class Session {
       const { code, name, role, session } = this.link;
       const { token, tools } = this;
       socket.send(
-        JSON.stringify({ code, name, role, session, token, ...(tools.length > 0 ? { tools } : {}) }),
+        JSON.stringify({
+          code,
+          name,
+          role,
+          session,
+          token,
+          ...(tools.length > 0 ? { tools } : {}),
+        }),
       );
     };
     socket.onmessage = event => {

@@ -62,9 +62,26 @@ export function Tray(props: { hands: Hands; tools: Tool[]; onDone(): void }): JS
           </button>
         ))}
       </div>
+      <div class="row" role="group" aria-label="Depth">
+        {([1, -1] as const).map(way => (
+          <button
+            key={way}
+            title={
+              way > 0
+                ? 'While you hold it; or the wheel, or W'
+                : 'While you hold it; or the wheel, or S'
+            }
+            onPointerDown={() => hands.goDeeper(way)}
+            onPointerUp={() => hands.goDeeper(0)}
+            onPointerLeave={() => hands.goDeeper(0)}
+          >
+            {way > 0 ? 'Deeper' : 'Nearer'}
+          </button>
+        ))}
+      </div>
       <p class="keys">
-        Left button: use it. Wheel, or W and S: deeper, nearer. F push, Space grasp, X cut. Q and E
-        turn it. Right button: the view.
+        Left button or one finger: use it. Right button or two fingers: the view. F push, Space
+        grasp, X cut, Q and E turn. Without a mouse: I, J, K and L move it.
       </p>
     </section>
   );
