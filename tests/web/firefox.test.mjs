@@ -100,6 +100,26 @@ test('an instructor joins by a link, sees a cut, marks the organ and leaves', kL
   assert.deepEqual(firefox.faults, []);
 });
 
+test('a surgeon presses the organ by pointer and key', kLimit, async () => {
+  await firefox.open('about:blank');
+  await firefox.open(link(world.server.codes.surgeon, 'surgeon', 'Sue'));
+  await firefox.live();
+  await until('a place in the session', () => firefox.evaluate('window.trocar.hands()?.own != null'));
+  const [x, y] = await firefox.evaluate('(r => [Math.round(r.x + r.width / 2), Math.round(r.y + r.height * 0.45)])(document.querySelector(".stage canvas").getBoundingClientRect())');
+  const act = (...actions) => firefox.send('input.performActions', { context: firefox.context, actions });
+  const pointer = (...steps) => ({ type: 'pointer', id: 'mouse', actions: steps.map(([px, py]) => ({ type: 'pointerMove', x: px, y: py, duration: 50 })) });
+  const tool = '(h => window.trocar.replica.tools().find(t => t.slot === 2 * h.own))(window.trocar.hands())';
+  await act(pointer([x - 30, y], [x, y]));
+  await until('a tool over the organ', () => firefox.evaluate(`${tool} !== undefined`));
+  await act({ type: 'key', id: 'keys', actions: [{ type: 'keyDown', value: 'f' }] });
+  await until('a force', () => firefox.evaluate(`(t => t.contactNodes > 0 && Math.hypot(...t.forceN) > 0.02)(${tool})`));
+  await firefox.picture('hand');
+  await firefox.send('input.releaseActions', { context: firefox.context });
+  await firefox.press('Leave');
+  await firefox.says('You have left the session.');
+  assert.deepEqual(firefox.faults, []);
+});
+
 test('a recording is opened by its link, and each place in it has the CRC of the native replay', kLimit, async () => {
   const key = world.web.text.match(/#recordings=(\w+)/)[1];
   const crcs = new Map(fs.readFileSync(TROCAR_CRCS, 'utf8').trim().split('\n').map(line => { const [frame, , crc] = line.split(' '); return [frame, crc]; }));
