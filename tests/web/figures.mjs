@@ -66,11 +66,11 @@ class Watcher {
   frames = 0;
   bytes = 0;
   ages = [];
-  constructor(port, code, name, replica) {
+  constructor(port, code, name, replica, role = 'observer') {
     this.replica = replica;
     this.socket = new WebSocket(`ws://127.0.0.1:${port}/session`, { headers: { origin: `http://127.0.0.1:${port}` } });
     this.socket.binaryType = 'arraybuffer';
-    this.socket.onopen = () => this.socket.send(JSON.stringify({ code, name, role: 'observer' }));
+    this.socket.onopen = () => this.socket.send(JSON.stringify({ code, name, role, ...(role === 'surgeon' ? { tools: ['probe'] } : {}) }));
     this.socket.onmessage = event => this.take(new Uint8Array(event.data));
     this.timer = setInterval(() => this.ping(), 500);
     this.sampler = replica ? setInterval(() => this.sample(), 10) : null;
@@ -125,6 +125,49 @@ class Watcher {
     clearInterval(this.timer);
     clearInterval(this.sampler);
     this.socket.close(1000);
+  }
+}
+
+// One who holds an instrument, and moves it by a micrometre with each sample: where it comes back from
+// the session says which sample that was, and so how long the hand took to the tissue and back.
+class Holder extends Watcher {
+  trips = [];
+  sentMs = [];
+  constructor(port, code, name, replica) {
+    super(port, code, name, replica, 'surgeon');
+    this.mover = setInterval(() => this.move(), 8);
+  }
+  move() {
+    if (this.socket.readyState !== 1 || this.frames === 0) return;
+    const x = 0.4 + 1e-6 * this.sentMs.length, place = Buffer.alloc(17);
+    place.set([0x1a, 15, 0x0d]);
+    place.writeFloatLE(x, 3);
+    place.set([0x15], 7);
+    place.writeFloatLE(0.2, 8);
+    place.set([0x1d], 12);
+    place.writeFloatLE(0.2, 13);
+    const one = Buffer.alloc(4);
+    one.writeFloatLE(1);
+    const orientation = Buffer.from([0x22, 5, 0x25, ...one]), number = encodeVarint(this.sentMs.length + 1);
+    const sample = [0x10, ...number, ...place, ...orientation];
+    this.socket.send(new Uint8Array([0x0a, sample.length, ...sample]));
+    this.sentMs.push(performance.now());
+  }
+  sample() {
+    super.sample();
+    this.replica.update(performance.now(), 1000, 0);
+    const at = this.replica.tools_at(), count = this.replica.tools();
+    const tools = new Float32Array(this.replica.memory.buffer, at, 23 * count);
+    for (let i = 0; i < tools.length; i += 23) {
+      const number = Math.round((tools[i + 13] - 0.4) * 1e6);
+      if (Math.abs(tools[i + 14] - 0.2) > 1e-4 || number < 0 || number >= this.sentMs.length || number === this.seen) continue;
+      this.seen = number;
+      this.trips.push(performance.now() - this.sentMs[number]);
+    }
+  }
+  close() {
+    clearInterval(this.mover);
+    super.close();
   }
 }
 
@@ -195,6 +238,24 @@ async function measureNetworks(web, code) {
   }
 }
 
+async function measureHands(web, code) {
+  result.hands = [];
+  const replica = await loadReplica();
+  for (const [roundTrip, loss] of [[2, 0], [20, 0], [60, 0], [60, 1], [60, 5], [150, 0], [150, 1], [150, 5]]) {
+    const proxy = await started('trocar-impair', ['--listen', '127.0.0.1:0', '--to', `127.0.0.1:${web.port}`, '--delay', String(roundTrip / 2), '--loss', String(loss)]);
+    replica.restart();
+    const holder = new Holder(proxy.port, code, `Hand ${roundTrip} ${loss}`, replica);
+    await sleep(6000);
+    holder.ages = [];
+    holder.trips = [];
+    await sleep(kSeconds * 1000);
+    result.hands.push({ roundTrip, loss, trip: quantile(holder.trips, 0.5), trip99: quantile(holder.trips, 0.99), age: quantile(holder.ages, 0.5), age99: quantile(holder.ages, 0.99) });
+    holder.close();
+    await sleep(300);
+    proxy.kill();
+  }
+}
+
 // Bytes that the program has had from sessions so far.
 async function sessionBytes(web) {
   const port = web.text.match(/figures at 127.0.0.1:(\d+)/)[1], text = await (await fetch(`http://127.0.0.1:${port}/metrics`)).text();
@@ -228,6 +289,8 @@ function table() {
     `| seek in a recording by HTTP ranges | median ${n(quantile(r.seeks.map(s => s[0]), 0.5))} ms, longest of 40 ${n(Math.max(...r.seeks.map(s => s[0])))} ms |`, '',
     '| round trip | loss | rate | age, median | age, 99 % | frames per second |', '|---|---|---|---|---|---|',
     ...r.networks.map(c => `| ${c.roundTrip} ms | ${c.loss} % | ${c.rate ? `${c.rate / 1000} Mbit/s` : 'no cap'} | ${n(c.median)} ms | ${n(c.p99)} ms | ${n(c.framesPerSecond)} |`), '',
+    '| round trip | loss | hand to tissue and back, median | 99 % | age, median | age, 99 % |', '|---|---|---|---|---|---|',
+    ...r.hands.map(c => `| ${c.roundTrip} ms | ${c.loss} % | ${n(c.trip)} ms | ${n(c.trip99)} ms | ${n(c.age)} ms | ${n(c.age99)} ms |`), '',
     '| watchers | of the program, CPU | of the server, CPU | its network | from the session | frames per second, median | least | memory |', '|---|---|---|---|---|---|---|---|',
     ...r.watchers.map(w => `| ${w.joined} | ${n(w.webCpu * 100)} % | ${n(w.serverCpu * 100)} % | ${n(w.networkCpu * 100, 1)} % | ${n(w.sessionMbit, 1)} Mbit/s | ${n(w.framesPerSecond)} | ${n(w.least)} | ${n(w.webMb)} MB |`)];
   return lines.join('\n') + '\n';
@@ -244,15 +307,16 @@ const web = await started('trocar-web', ['--insecure-loopback', '--listen', '127
 const key = web.text.match(/#recordings=(\w+)/)[1], base = `http://127.0.0.1:${web.port}/`;
 try {
   await measureSize();
-  const only = process.env.TROCAR_ONLY ?? 'browser networks watchers';
+  const only = process.env.TROCAR_ONLY ?? 'browser networks hands watchers';
   if (only.includes('browser')) await measureBrowser(`${base}#join=${codes.observer}&role=observer&name=Eve`, `${base}#recordings=${key}&file=lesson.mcap`);
   if (only.includes('networks')) await measureNetworks(web, codes.observer);
+  if (only.includes('hands')) await measureHands(web, codes.surgeon);
   if (only.includes('watchers')) await measureWatchers(web, server, codes.observer);
 } finally {
   for (const child of children) child.kill('SIGKILL');
   fs.writeFileSync(`${TROCAR_WORK}/figures.json`, JSON.stringify(result, null, 1));
 }
-if (result.networks && result.watchers && result.seeks) {
+if (result.networks && result.hands && result.watchers && result.seeks) {
   fs.writeFileSync(`${TROCAR_WORK}/figures.md`, table());
   console.log(table());
 } else console.log(JSON.stringify(result, null, 1));
