@@ -84,6 +84,20 @@ test('a grasp lifts tissue, and one who watches may hold nothing', async () => {
   await until('it pulls', async () => Math.hypot(...(await toolOf(page, slot)).forceN) > 0.05);
   await picture(page, 'hand-lifts');
   await page.mouse.up();
+  // Where somebody holds nobody else does, and is told who.
+  await page.mouse.move(x - 80, y + 40);
+  await sleep(500);
+  await page.mouse.down();
+  await until('a grasp again', async () => (await toolOf(page, slot)).hasClaim);
+  const other = await surgeon('Other');
+  await other.page.mouse.move(x - 80, y + 40);
+  await until('another tool', () => toolOf(other.page, other.slot));
+  await other.page.mouse.down();
+  await other.page.locator('.banner', { hasText: 'Grasp' }).waitFor({ timeout: kPatience });
+  await picture(other.page, 'hand-refused');
+  await other.page.mouse.up();
+  await page.mouse.up();
+  await close(other.page);
   const watcher = await openPage(link(world.server.codes.observer, 'observer', 'Olga'));
   await live(watcher);
   assert.equal(await watcher.locator('.tray').count(), 0);

@@ -30,7 +30,8 @@ import { Tray } from './tray';
 
 const kPanelMs = 100,
   kShownTicks = 30_000,
-  kMostEvents = 500;
+  kMostEvents = 500,
+  kNoticeMs = 4000; // how long one is told what has become of one's own instrument
 
 export function Live(props: {
   link: Link;
@@ -51,6 +52,7 @@ export function Live(props: {
     crc = useRef('');
   const picture = useRef<Picture | null>(null),
     hands = useRef<Hands | null>(null),
+    notice = useRef({ text: '', untilMs: 0 }),
     stage = useRef<LessonStage | null>(null),
     progress = useRef<LessonProgress | null>(null);
   const pace = useRef<SessionPace | null>(null),
@@ -88,7 +90,11 @@ export function Live(props: {
         people.current = [...value.participant].sort((a, b) => a.slot - b.slot);
         hands.current?.heed(own.current, people.current);
       }
-      if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
+      if (kind === 'claimEvent') {
+        note(Number(value.tick), kindOf(value.outcome), value.text);
+        if (value.tool >> 1 === own.current && kindOf(value.outcome) !== 'grant')
+          notice.current = { text: value.text, untilMs: performance.now() + kNoticeMs };
+      }
       if (kind === 'markEvent')
         note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
       if (kind === 'teachEvent')
@@ -245,6 +251,11 @@ export function Live(props: {
           {session.state === 'away' && (
             <p class="banner" role="alert">
               {session.why} The picture is old; the page comes back by itself.
+            </p>
+          )}
+          {hands.current && performance.now() < notice.current.untilMs && (
+            <p class="banner" role="status">
+              {notice.current.text}
             </p>
           )}
           {isPaused && (
