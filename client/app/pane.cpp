@@ -124,6 +124,8 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
   scene_.shows_arrows = look.overlays.arrows;
   if (surface_.is_valid()) {
     scene_.topology_version = replica.topology_version();
+    scene_.organ_name = replica.topology().organ_name;
+    scene_.held_vertices = replica.topology().fixed_vertices;
     scene_.rest_positions = replica.topology().rest_positions;
     scene_.triangles = replica.topology().triangles;
     scene_.is_wound = replica.topology().is_wound;
@@ -144,6 +146,7 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
   }
   find_lent_view(replica, look.is_recording);
   lent_.apply(scene_, camera_, look.is_recording);
+  camera_.keep_clear(scene_.positions, scene_.triangles, size());
 }
 
 void Pane::find_lent_view(const replica::Replica& replica, bool is_recording) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/shape/clear_eye.h"
+
 namespace trocar::render {
 namespace {
 
@@ -56,12 +58,30 @@ void OrbitCamera::update(const device::PointerInput& input, Size size, float sec
   if (input.zoom_in != input.zoom_out) zoom(std::exp((input.zoom_in ? -1.0f : 1.0f) * seconds));
 }
 
+void OrbitCamera::keep_clear(std::span<const Vec3f> positions,
+                             std::span<const shape::TriangleCorners> triangles, Size size) {
+  back_ = 0;
+  const device::ViewRays view = rays(size);
+  const auto clear = shape::clear_eye(view.eye, view.forward, positions, triangles,
+                                      lens_ ? shape::kScopeClearMetres : shape::kClearMetres);
+  back_ = clear.back_m;
+  nearest_ = clear.nearest_m;
+}
+
+float OrbitCamera::near_m(Size size) const {
+  const float usual = lens_ ? kLensNear : kNear;
+  if (!nearest_) return usual;
+  const device::ViewRays view = rays(size);
+  return std::min(usual,
+                  shape::near_plane(*nearest_, view.tan_half_height, view.width / view.height));
+}
+
 device::ViewRays OrbitCamera::rays(Size size) const {
   device::ViewRays view;
   view.width = static_cast<float>(std::max(size.width, 1));
   view.height = static_cast<float>(std::max(size.height, 1));
   if (lens_) {
-    view.eye = lens_->eye;
+    view.eye = lens_->eye - lens_->forward * back_;
     view.forward = lens_->forward;
     view.up = lens_->up;
     view.right = cross(view.forward, view.up);
@@ -72,7 +92,7 @@ device::ViewRays OrbitCamera::rays(Size size) const {
                        -std::cos(yaw_) * std::cos(pitch_)};
   view.right = {std::cos(yaw_), 0, -std::sin(yaw_)};
   view.up = cross(view.right, view.forward);
-  view.eye = centre_ - view.forward * distance_;
+  view.eye = centre_ - view.forward * (distance_ + back_);
   view.tan_half_height = kTanHalfHeight;
   return view;
 }
@@ -108,7 +128,7 @@ Matrix4 OrbitCamera::clip_from_world(Size size) const {
                                   -dot(v.up, v.eye),
                                   dot(v.forward, v.eye),
                                   1};
-  const float f = 1 / v.tan_half_height, near = lens_ ? kLensNear : kNear;
+  const float f = 1 / v.tan_half_height, near = near_m(size);
   const Matrix4 clip_from_eye = {f * v.height / v.width,
                                  0,
                                  0,
@@ -132,7 +152,7 @@ std::optional<ScreenPoint> OrbitCamera::project(const Vec3f& world, Size size) c
   const device::ViewRays v = rays(size);
   const Vec3f p = world - v.eye;
   const float depth = dot(p, v.forward);
-  if (depth < kNear) return std::nullopt;
+  if (depth < near_m(size)) return std::nullopt;
   const float scale = v.height / (2 * v.tan_half_height * depth);
   return ScreenPoint{v.width / 2 + dot(p, v.right) * scale, v.height / 2 - dot(p, v.up) * scale};
 }

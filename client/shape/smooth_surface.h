@@ -58,6 +58,12 @@ class SmoothSurface {
                : first_wound_triangle_ * (fine_triangles_.size() / coarse_triangles_.size());
   }
   std::size_t coarse_vertex_count() const { return coarse_vertex_count_; }
+  // What is halved: the outer ones come first, the wound's have their own copies of rim vertices.
+  // Each became the same number of triangles(), in this order.
+  std::span<const TriangleCorners> coarse_triangles() const { return coarse_triangles_; }
+  std::size_t coarse_outer_count() const { return first_wound_triangle_; }
+  // Coarse vertices of which the wound has copies, in the order of these.
+  std::span<const std::uint32_t> rim() const { return rim_; }
   std::size_t vertex_count() const {
     return coarse_vertex_count_ + rim_.size() + midpoints_.size();
   }
@@ -82,6 +88,12 @@ class SmoothSurface {
   void extend_values(std::vector<T>& values) const {
     std::size_t next = coarse_vertex_count_;
     for (const std::uint32_t vertex : rim_) values[next++] = values[vertex];
+    extend_midpoints(values);
+  }
+  // Likewise to midpoints alone: rim vertices have values of their own.
+  template <typename T>
+  void extend_midpoints(std::vector<T>& values) const {
+    std::size_t next = coarse_vertex_count_ + rim_.size();
     for (const Midpoint& m : midpoints_) values[next++] = (values[m.a] + values[m.b]) * 0.5f;
   }
 

@@ -131,18 +131,24 @@ void PageModel::build_surface(std::size_t triangle_budget) {
   ++geometry_version_;
   rest_.resize(smooth_.vertex_count());
   smooth_.measure_rim(shape::kDeepMetres, rim_distances_);
+  parts_.resize(smooth_.vertex_count());
+  std::ranges::copy(shape::parts_of(look(), topology.rest_positions.size(), topology.triangles,
+                                    topology.fixed_vertices),
+                    parts_.begin());
+  smooth_.extend_values(parts_);
   for (std::size_t i = 0; i < rest_.size(); ++i) {
     const Vec3f& p = smooth_.positions()[i];
-    rest_[i] = {p.x, p.y, p.z, shape::rim_of(rim_distances_[i], smooth_.is_wound()[i] != 0)};
+    rest_[i] = {p.x, p.y, p.z,
+                4 * parts_[i] + shape::rim_of(rim_distances_[i], smooth_.is_wound()[i] != 0)};
   }
+  film_.build(smooth_, topology.rest_positions);
 }
 
 void PageModel::update_figures() {
-  shape::cover_with_blood(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres),
-                          covers_);
+  film_.spread(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres));
   lips_.resize(smooth_.vertex_count());
   for (std::size_t i = 0; i < lips_.size(); ++i)
-    lips_[i] = shape::lip_bytes(smooth_.lips()[i], covers_[i]);
+    lips_[i] = shape::lip_bytes(smooth_.lips()[i], film_.depths()[i]);
   const auto* newest = replica_->newest();
   if (newest == nullptr || !newest->has_state) return;  // its figures come in a moment
   waiting_tools_ = newest->figures.pace.rate.waiting_tools;
@@ -213,7 +219,7 @@ void PageModel::update_fine() {
   fine_.follow({topology.rest_positions, topology.triangles, topology.is_wound},
                replica_->topology_version());
   fine_.update(shown_->positions(), std::span(tints_).first(coarse),
-               std::span(covers_).first(coarse));
+               std::span(film_.depths()).first(coarse));
 }
 
 void PageModel::update_drawing() {
@@ -274,6 +280,13 @@ shape::Lens PageModel::lens_of(std::uint8_t slot, const tool::ToolShape& shape) 
   for (const auto& tool : shown_->tools())
     if (tool.slot.value == slot) world_from_tool = tool.world_from_proxy;
   return shape::lens_of(world_from_tool, shape);
+}
+
+shape::ClearEye PageModel::clear_eye(const Vec3f& eye, const Vec3f& forward, bool is_lens) const {
+  const auto& topology = replica_->topology();
+  if (shown_->positions().size() != topology.rest_positions.size()) return {0, shape::kLookMetres};
+  return shape::clear_eye(eye, forward, shown_->positions(), topology.triangles,
+                          is_lens ? shape::kScopeClearMetres : shape::kClearMetres);
 }
 
 const shape::MeshVertices& PageModel::make_hand_line(float length, shape::Colour colour) {

@@ -19,10 +19,12 @@
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
 #include "client/shape/blood_film.h"
+#include "client/shape/clear_eye.h"
 #include "client/shape/instrument_mesh.h"
 #include "client/shape/lens.h"
 #include "client/shape/ribbon.h"
 #include "client/shape/smooth_surface.h"
+#include "client/shape/tissue_look.h"
 #include "client/shape/tool_mesh.h"
 #include "client/web/wasm/page_fine.h"
 #include "common/base/bytes.h"
@@ -89,7 +91,9 @@ class PageModel {
   const shape::SmoothSurface& surface() const { return smooth_; }
   // It takes the place of the outside, where it is shown.
   const PageFine& fine() const { return fine_; }
-  // Returns x, y, z at rest, and shape::rim_of.
+  // Says what the organ looks like.
+  const shape::TissueLook& look() const { return shape::look_of(replica_->topology().organ_name); }
+  // Returns x, y, z at rest, and shape::rim_of with four times the number of the part.
   std::span<const std::array<float, 4>> rest() const { return rest_; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
   // Returns shape::lip_bytes, with the blood of this moment.
@@ -119,6 +123,8 @@ class PageModel {
   // Returns how somebody sees with the tool in that slot, where it is shown now.
   shape::Lens lens_of(std::uint8_t slot, const tool::ToolShape& shape) const;
   const shape::MeshVertices& make_arrow(float length, float radius, shape::Colour colour);
+  // Keeps an eye out of the tissue as it is shown now.
+  shape::ClearEye clear_eye(const Vec3f& eye, const Vec3f& forward, bool is_lens) const;
 
  private:
   bool accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes);
@@ -141,7 +147,8 @@ class PageModel {
   std::vector<PageTint> tints_;
   PageFine fine_;
   std::vector<std::array<std::uint8_t, 4>> overlay_;
-  std::vector<float> covers_;  // by blood, 0 to 1
+  shape::BloodFilm film_;
+  std::vector<float> parts_;  // per vertex (shape::parts_of)
   std::vector<std::array<std::int8_t, 4>> lips_;
   std::optional<PageBlood> blood_;
   std::uint32_t waiting_tools_ = 0;
