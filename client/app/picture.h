@@ -58,7 +58,8 @@ class Picture {
   void lay_out();
   void observe_beside();
   void update_beside(std::uint64_t now_ns);
-  void move_cameras(const device::PointerInput& input, float seconds);
+  void move_cameras(const replica::Replica& replica, const device::PointerInput& input,
+                    float seconds);
   void make_beside_scene(float seconds);
   void draw_panes(render::Quality quality);
   void stand_still();

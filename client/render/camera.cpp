@@ -11,6 +11,7 @@ namespace {
 constexpr float kTanHalfHeight = 0.2867f;  // 32 degrees of vertical field of view
 constexpr float kNear = 0.02f, kLensNear = 0.003f, kFar = 6.0f;
 constexpr float kOrbitPerPixel = 0.006f;
+constexpr float kNearestRadii = 0.06f;  // of the body, from what it turns about
 
 }  // namespace
 
@@ -28,13 +29,23 @@ void OrbitCamera::orbit(float yaw, float pitch) {
 }
 
 void OrbitCamera::zoom(float factor) {
-  distance_ = std::clamp(distance_ * factor, radius_ * 0.8f, radius_ * 12);
+  distance_ = std::clamp(distance_ * factor, radius_ * kNearestRadii, radius_ * 12);
+}
+
+void OrbitCamera::zoom_about(const Vec3f& focus, float factor) {
+  const float before = distance_;
+  zoom(factor);
+  const Vec3f centre = focus + (centre_ - focus) * (distance_ / before);
+  // Whoever zooms out beside the body, again and again, still has it in the picture.
+  const Vec3f off = centre - body_;
+  const float far = length(off);
+  centre_ = far > radius_ ? body_ + off * (radius_ / far) : centre;
 }
 
 void OrbitCamera::look(const Vec3f& eye, const Vec3f& target) {
   const Vec3f back = eye - target;
   centre_ = target;
-  distance_ = std::clamp(length(back), radius_ * 0.2f, radius_ * 40);
+  distance_ = std::clamp(length(back), radius_ * kNearestRadii, radius_ * 40);
   yaw_ = std::atan2(back.x, back.z);
   pitch_ = std::clamp(std::atan2(back.y, std::hypot(back.x, back.z)), -1.5f, 1.5f);
 }
@@ -47,15 +58,18 @@ void OrbitCamera::stand_as(const OrbitCamera& other) {
   centre_ = body_ + (other.centre_ - other.body_) * size;
 }
 
-void OrbitCamera::update(const device::PointerInput& input, Size size, float seconds) {
+void OrbitCamera::update(const device::PointerInput& input, Size size, float seconds,
+                         const std::optional<Vec3f>& focus) {
   if (input.right) orbit(-input.dx * kOrbitPerPixel, input.dy * kOrbitPerPixel);
   if (input.middle) {
     const device::ViewRays view = rays(size);
     const float metres = 2 * kTanHalfHeight * distance_ / view.height;
     centre_ += view.right * (-input.dx * metres) + view.up * (input.dy * metres);
   }
-  if (input.control && input.wheel != 0) zoom(std::pow(0.9f, input.wheel));
-  if (input.zoom_in != input.zoom_out) zoom(std::exp((input.zoom_in ? -1.0f : 1.0f) * seconds));
+  float factor = 1;
+  if (input.control && input.wheel != 0) factor = std::pow(0.9f, input.wheel);
+  if (input.zoom_in != input.zoom_out) factor *= std::exp((input.zoom_in ? -1.0f : 1.0f) * seconds);
+  if (factor != 1) zoom_about(focus.value_or(centre_), factor);
 }
 
 void OrbitCamera::keep_clear(std::span<const Vec3f> positions,

@@ -27,10 +27,16 @@ class OrbitCamera {
  public:
   // Looks at the centre of a body of this radius (m) from the front, a little from above.
   void frame(const Vec3f& centre, float radius);
-  // Right drag orbits, middle drag pans, Ctrl + wheel and the zoom keys zoom.
-  void update(const device::PointerInput& input, Size size, float seconds);
+  // Right drag orbits, middle drag pans, Ctrl + wheel and the zoom keys zoom about `focus`; without
+  // one about the centre.
+  void update(const device::PointerInput& input, Size size, float seconds,
+              const std::optional<Vec3f>& focus = {});
   void orbit(float yaw, float pitch);  // rad
   void zoom(float factor);
+  // A place that stays where it is in the picture.
+  void zoom_about(const Vec3f& focus, float factor);
+  // Turns about this place from here on, and has it in the middle.
+  void aim_at(const Vec3f& place) { centre_ = place; }
   // Stands at `eye` and turns about `target`, as far as this camera can: its up is up.
   void look(const Vec3f& eye, const Vec3f& target);
   // Stands to its body as `other` stands to the other's, in proportion to their sizes.

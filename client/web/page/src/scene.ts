@@ -101,7 +101,8 @@ export class Picture {
     this.renderer.setClearColor(0, 0);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
-    this.controls.minDistance = 0.04;
+    this.controls.zoomToCursor = true;
+    this.controls.minDistance = 0.01;
     this.controls.maxDistance = 2.5;
     this.controls.target = this.main.target;
     this.controls.addEventListener('start', () => {
