@@ -14,7 +14,7 @@ namespace trocar::render {
 
 // Plain is for software. Near adds what only an eye that is near sees.
 enum class Detail : std::uint8_t { Plain, PlainNear, Fine };
-// What a blade has laid open is the inside.
+// The inside is what a blade has laid open.
 enum class Side : std::uint8_t { Outside, Inside };
 
 class OrganShaders {

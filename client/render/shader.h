@@ -26,7 +26,7 @@ class Shader {
   void set(const char* name, const Matrix4& value) const;
   // The uniform is an array of vec4.
   void set_array(const char* name, const float* values, int count) const;
-  // Of vec3.
+  // The uniform is an array of vec3.
   void set_array(const char* name, std::span<const Vec3f> values) const;
 
  private:

@@ -33,7 +33,7 @@ vec2 highlights(vec3 n, vec3 view, vec3 light) {
   sharp *= sharp;
   return vec2(h, sharp * sharp);
 }
-// The key light at a place so far from the eye.
+// Returns the key light at a place so far from the eye.
 float key_light(float apart) {
   return lamp > 0.0 ? 1.7 * lamp * lamp / (lamp * lamp + apart * apart) : 1.0;
 }
@@ -170,7 +170,7 @@ void main() {
 #endif
   float near = 0.0;
 #ifdef NEAR
-  // What is too small to be seen from afar.
+  // This is too small to be seen from afar.
   near = clamp(1.5 - apart * 7.0, 0.0, 1.0);
   vec4 grain = mix(vec4(0.5), texture(noise, kTurn * place), near);
 #else

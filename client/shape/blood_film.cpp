@@ -43,7 +43,7 @@ void BloodFilm::share_out(const SmoothSurface& surface, std::span<const float> l
   const std::size_t coarse = surface.coarse_vertex_count();
   const auto rim = surface.rim();
   for (std::size_t i = 0; i < coarse; ++i) depths_[i] = levels[i] * level_m;
-  // What stands on the outside around each vertex of the rim.
+  // Around each vertex of the rim, so much stands on the outside.
   around_.assign(coarse, 0);
   counts_.assign(coarse, 0);
   for (const auto& t : surface.coarse_triangles().first(surface.coarse_outer_count()))

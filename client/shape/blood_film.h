@@ -22,7 +22,7 @@
 
 namespace trocar::shape {
 
-// What the shader takes as 1: a film that is deeper is drawn as this. The wire has no deeper one.
+// The shader takes this as 1. A film that is deeper is drawn as this; the wire has none.
 inline constexpr float kDeepestFilmMetres = 0.0051f;
 
 class BloodFilm {

@@ -13,7 +13,7 @@ struct Triangle {
   Vec3f a, b, c;
 };
 
-// The nearest point of a triangle (Ericson 2005, 5.1.5).
+// Returns how far its nearest point is (Ericson 2005, 5.1.5).
 float distance_to(const Triangle& t, const Vec3f& p) {
   const Vec3f ab = t.b - t.a, ac = t.c - t.a, ap = p - t.a;
   const float d1 = dot(ab, ap), d2 = dot(ac, ap);
@@ -81,7 +81,7 @@ class Axis {
   Vec3f eye_, back_, right_, up_;
 };
 
-// What of the surface is near the way back, or near where it begins.
+// A part of the surface is near the way back, or near where it begins.
 struct Surroundings {
   std::vector<Triangle> on_the_way, around;
   std::vector<Crossing> crossings;  // nearest first

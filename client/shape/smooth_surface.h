@@ -58,8 +58,8 @@ class SmoothSurface {
                : first_wound_triangle_ * (fine_triangles_.size() / coarse_triangles_.size());
   }
   std::size_t coarse_vertex_count() const { return coarse_vertex_count_; }
-  // What is halved: the outer ones come first, the wound's have their own copies of rim vertices.
-  // Each became the same number of triangles(), in this order.
+  // These are halved: outer ones first; the wound's have their own copies of rim vertices. Each
+  // became the same number of triangles(), in this order.
   std::span<const TriangleCorners> coarse_triangles() const { return coarse_triangles_; }
   std::size_t coarse_outer_count() const { return first_wound_triangle_; }
   // Coarse vertices of which the wound has copies, in the order of these.
@@ -90,7 +90,7 @@ class SmoothSurface {
     for (const std::uint32_t vertex : rim_) values[next++] = values[vertex];
     extend_midpoints(values);
   }
-  // Likewise to midpoints alone: rim vertices have values of their own.
+  // Extends them to midpoints alone: rim vertices have values of their own.
   template <typename T>
   void extend_midpoints(std::vector<T>& values) const {
     std::size_t next = coarse_vertex_count_ + rim_.size();

@@ -1,9 +1,9 @@
 #pragma once
 
-// What organs look like: a table that authors may add to. The first row of which a word is in the
-// organ's name says how it is drawn, in the window and on the page alike; a name with none of them
-// gets the first row. Names are those of built-in organs, or what an imported organ is called, in
-// small or capital letters.
+// A table says what organs look like, and authors may add to it. The first row of which a word is
+// in the organ's name says how it is drawn, in the window and on the page alike; a name with none
+// of them gets the first row. Names are those of built-in organs, or what an imported organ is
+// called, in small or capital letters.
 //
 // Colours are linear, as tissue answers a white lamp of the theatre. Numbers without a unit are
 // shares of a liver's.
@@ -124,7 +124,7 @@ const TissueLook& look_of(std::string_view organ_name);
 
 // The shader knows so many parts of an organ apart; the last one stands for all beyond.
 inline constexpr std::size_t kLookParts = 4;
-// What the shader takes, in its order.
+// The shader takes these, in this order.
 struct LookFigures {
   std::array<Vec3f, kLookParts> dark, light;
   std::array<float, 4> lines, figures;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr float kLevel = 20e-6f;
 
-// As the server counts it: a third of the triangles around a vertex, at rest.
+// The server counts it so, too: a third of the triangles around a vertex, at rest.
 std::vector<double> areas_of(const testing::CutLiver& cut) {
   std::vector<double> areas(cut.rest.size());
   for (const auto& t : cut.triangles) {
@@ -81,7 +81,7 @@ TEST(BloodFilm, RunsIntoTheWoundAndNotUpItsLip) {
         static_cast<double>(film.depths()[v] * film.areas()[v]);
   EXPECT_GT(inside, 0);
   EXPECT_LT(outside, 1e-3 * inside) << "all that bleeds at the rim is in the wound";
-  // Where the outside is wet, too, it stays there.
+  // It stays on the outside where that is wet, too.
   std::ranges::fill(levels, 20.0f);
   film.spread(surface, levels, kLevel);
   double area = 0;

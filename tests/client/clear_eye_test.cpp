@@ -79,7 +79,7 @@ TEST(ClearEye, FliesThroughACutLiverAndIsNeverInIt) {
     ASSERT_LT(seen.winding, 0.5f) << "at place " << i << " tissue is around the eye";
     ASSERT_GE(clear.nearest_m, wanted);
     ASSERT_GE(seen.nearest_m * 1.0001f, clear.nearest_m) << i;
-    // What is drawn is rounder than what was sent.
+    // The surface that is drawn is rounder than the one that was sent.
     if (i % 50 == 0) {
       ASSERT_LT(look_from(place, drawn.positions(), drawn.triangles()).winding, 0.5f) << i;
     }

@@ -26,7 +26,7 @@ class PaneTest : public ::testing::Test {
     source_.queue_start();
     step(20);
   }
-  // What is seen at this pixel.
+  // Returns the place that is seen at this pixel.
   Vec3f seen_at(float x, float y) const {
     const auto view = pane_->camera().rays(pane_->size());
     const Vec3f ray = view.ray_through(x, y);

@@ -129,26 +129,27 @@ void PageModel::build_surface(std::size_t triangle_budget) {
   built_version_ = replica_->topology_version();
   built_budget_ = triangle_budget;
   ++geometry_version_;
-  rest_.resize(smooth_.vertex_count());
-  smooth_.measure_rim(shape::kDeepMetres, rim_distances_);
-  parts_.resize(smooth_.vertex_count());
+  attributes_.rest.resize(smooth_.vertex_count());
+  smooth_.measure_rim(shape::kDeepMetres, attributes_.rim_distances);
+  attributes_.parts.resize(smooth_.vertex_count());
   std::ranges::copy(shape::parts_of(look(), topology.rest_positions.size(), topology.triangles,
                                     topology.fixed_vertices),
-                    parts_.begin());
-  smooth_.extend_values(parts_);
-  for (std::size_t i = 0; i < rest_.size(); ++i) {
+                    attributes_.parts.begin());
+  smooth_.extend_values(attributes_.parts);
+  for (std::size_t i = 0; i < attributes_.rest.size(); ++i) {
     const Vec3f& p = smooth_.positions()[i];
-    rest_[i] = {p.x, p.y, p.z,
-                4 * parts_[i] + shape::rim_of(rim_distances_[i], smooth_.is_wound()[i] != 0)};
+    attributes_.rest[i] = {p.x, p.y, p.z,
+                           4 * attributes_.parts[i] + shape::rim_of(attributes_.rim_distances[i],
+                                                                    smooth_.is_wound()[i] != 0)};
   }
-  film_.build(smooth_, topology.rest_positions);
+  attributes_.film.build(smooth_, topology.rest_positions);
 }
 
 void PageModel::update_figures() {
-  film_.spread(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres));
-  lips_.resize(smooth_.vertex_count());
-  for (std::size_t i = 0; i < lips_.size(); ++i)
-    lips_[i] = shape::lip_bytes(smooth_.lips()[i], film_.depths()[i]);
+  attributes_.film.spread(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres));
+  attributes_.lips.resize(smooth_.vertex_count());
+  for (std::size_t i = 0; i < attributes_.lips.size(); ++i)
+    attributes_.lips[i] = shape::lip_bytes(smooth_.lips()[i], attributes_.film.depths()[i]);
   const auto* newest = replica_->newest();
   if (newest == nullptr || !newest->has_state) return;  // its figures come in a moment
   waiting_tools_ = newest->figures.pace.rate.waiting_tools;
@@ -219,7 +220,7 @@ void PageModel::update_fine() {
   fine_.follow({topology.rest_positions, topology.triangles, topology.is_wound},
                replica_->topology_version());
   fine_.update(shown_->positions(), std::span(tints_).first(coarse),
-               std::span(film_.depths()).first(coarse));
+               std::span(attributes_.film.depths()).first(coarse));
 }
 
 void PageModel::update_drawing() {

@@ -94,10 +94,10 @@ class PageModel {
   // Says what the organ looks like.
   const shape::TissueLook& look() const { return shape::look_of(replica_->topology().organ_name); }
   // Returns x, y, z at rest, and shape::rim_of with four times the number of the part.
-  std::span<const std::array<float, 4>> rest() const { return rest_; }
+  std::span<const std::array<float, 4>> rest() const { return attributes_.rest; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
   // Returns shape::lip_bytes, with the blood of this moment.
-  std::span<const std::array<std::int8_t, 4>> lips() const { return lips_; }
+  std::span<const std::array<std::int8_t, 4>> lips() const { return attributes_.lips; }
   // Returns what the newest frame says of blood; null: the session does not bleed.
   const PageBlood* blood() const { return blood_ ? &*blood_ : nullptr; }
   // Returns wire::RateFigures::waiting_tools of the newest frame.
@@ -142,14 +142,17 @@ class PageModel {
   shape::SmoothSurface smooth_;
   std::uint64_t built_version_ = 0, geometry_version_ = 0;
   std::size_t built_budget_ = 0;
-  std::vector<std::array<float, 4>> rest_;
-  std::vector<float> rim_distances_;
+  // The shader takes these of each vertex.
+  struct Attributes {
+    std::vector<std::array<float, 4>> rest;
+    std::vector<float> rim_distances, parts;
+    shape::BloodFilm film;
+    std::vector<std::array<std::int8_t, 4>> lips;
+  };
+  Attributes attributes_;
   std::vector<PageTint> tints_;
   PageFine fine_;
   std::vector<std::array<std::uint8_t, 4>> overlay_;
-  shape::BloodFilm film_;
-  std::vector<float> parts_;  // per vertex (shape::parts_of)
-  std::vector<std::array<std::int8_t, 4>> lips_;
   std::optional<PageBlood> blood_;
   std::uint32_t waiting_tools_ = 0;
   std::vector<PageTool> tools_;
