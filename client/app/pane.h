@@ -48,6 +48,7 @@ class Pane {
     bool is_recording = false;
   };
   void make_scene(const replica::Replica& replica, const Hands& hands, const Look& look);
+  void set_fineness(float share) { renderer_.set_fineness(share); }
   // Draws into its region.
   void draw(render::Quality quality);
   // The region is the part of the window that it covers.

@@ -33,6 +33,8 @@ class Picture {
   // To be called often: frames pass faster than pictures are drawn.
   void observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns);
   bool should_close() const { return context_->should_close(); }
+  // Draws this share of the pixels along a side; a picture to keep has all of them.
+  void set_fineness(float share);
   bool is_software() const { return context_->is_software(); }
   std::uint64_t count() const { return count_; }
   // Draws once more what was drawn last, as finely as it goes, and returns it.

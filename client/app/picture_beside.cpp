@@ -79,6 +79,11 @@ void Picture::make_beside_scene(float seconds) {
   beside_->pane.make_scene(beside_->replica, {}, {overlays_, seconds, true});
 }
 
+void Picture::set_fineness(float share) {
+  pane_.set_fineness(share);
+  if (beside_) beside_->pane.set_fineness(share);
+}
+
 void Picture::draw_panes(render::Quality quality) {
   pane_.draw(quality);
   if (beside_) beside_->pane.draw(quality);

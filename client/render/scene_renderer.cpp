@@ -118,11 +118,20 @@ std::string lit(const char* head, const char* fragment_source) {
   return std::string(head) + kLightingSource + fragment_source;
 }
 
-void blit(GLuint from, GLuint to, Size size, int left = 0, int bottom = 0) {
+void blit(GLuint from, GLuint to, Size size, const Region& region) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, from);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to);
-  glBlitFramebuffer(0, 0, size.width, size.height, left, bottom, left + size.width,
-                    bottom + size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  const bool is_same = size.width == region.size.width && size.height == region.size.height;
+  glBlitFramebuffer(0, 0, size.width, size.height, region.left, region.bottom,
+                    region.left + region.size.width, region.bottom + region.size.height,
+                    GL_COLOR_BUFFER_BIT, is_same ? GL_NEAREST : GL_LINEAR);
+}
+
+Size scaled(Size size, float share) {
+  const auto part = [share](int side) {
+    return std::max(1, static_cast<int>(std::lround(static_cast<float>(side) * share)));
+  };
+  return {part(size.width), part(size.height)};
 }
 
 }  // namespace
@@ -228,6 +237,7 @@ void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   topology_version = scene.topology_version;
   surface.build(scene.rest_positions.size(), scene.triangles, scene.is_wound,
                 is_software ? kTriangleBudgetSoftware : kTriangleBudget);
+  surface.smooth_borders(scene.rest_positions);
   surface.update(scene.rest_positions);
   tints.resize(known);
   tints.resize(surface.vertex_count());
@@ -503,9 +513,10 @@ void SceneRenderer::Parts::draw_backdrop(const OrbitCamera& camera) {
 void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, const Region& region,
                          Quality quality) {
   Parts& parts = *parts_;
-  parts.size = region.size;
+  if (region.size.width <= 0 || region.size.height <= 0) return;  // minimised
+  const bool is_sharp = quality == Quality::Best || !parts.is_software;
+  parts.size = is_sharp ? region.size : scaled(region.size, fineness_);
   const auto [width, height] = parts.size;
-  if (width <= 0 || height <= 0) return;  // minimised
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
   glDisable(GL_DEPTH_TEST);
@@ -513,7 +524,6 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
   if (scene.topology_version != parts.topology_version) parts.load_topology(scene);
   parts.fine.follow(scene.fine_surface, {scene.rest_positions, scene.triangles, scene.is_wound},
                     scene.topology_version);
-  const bool is_sharp = quality == Quality::Best || !parts.is_software;
   Target& target = is_sharp ? parts.sharp : parts.plain;
   target.resize(parts.size);
   if (is_sharp) {
@@ -521,7 +531,7 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
     parts.draw_field(camera);
   } else {
     parts.draw_backdrop(camera);
-    blit(parts.backdrop.framebuffer, target.framebuffer, parts.size);
+    blit(parts.backdrop.framebuffer, target.framebuffer, parts.size, {0, 0, parts.size});
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
   }
   glClear(GL_DEPTH_BUFFER_BIT);
@@ -537,7 +547,7 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
   glDisable(GL_DEPTH_TEST);
   if (camera.lens() && camera.lens()->is_endoscope) parts.draw_scope_mask();
   glBindVertexArray(0);
-  blit(target.framebuffer, context_.framebuffer(), parts.size, region.left, region.bottom);
+  blit(target.framebuffer, context_.framebuffer(), parts.size, region);
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
 }
 

@@ -85,6 +85,9 @@ class SceneRenderer {
   explicit SceneRenderer(const GlContext& context);
   ~SceneRenderer();
 
+  // Draws live pictures in software with this share of the pixels along a side, more than 0, at
+  // most 1.
+  void set_fineness(float share) { fineness_ = share; }
   // Into this part of the context's framebuffer.
   void draw(const SceneView& scene, const OrbitCamera& camera, const Region& region,
             Quality quality = Quality::Live);
@@ -94,6 +97,7 @@ class SceneRenderer {
  private:
   struct Parts;
   const GlContext& context_;
+  float fineness_ = 1;
   std::unique_ptr<Parts> parts_;
 };
 

@@ -142,7 +142,7 @@ const float kRelief = 0.30, kFillShine = 0.15;
 #else
 const vec2 kScales = vec2(11.0, 58.0);
 const float kRelief = 0.10, kFillShine = 1.0;
-const float kThin = 0.100;  // mm: a thinner film stands in patches of this depth
+const float kThin = 0.160;  // mm: a thinner film stands in patches of this depth
 #endif
 
 void main() {
@@ -203,9 +203,9 @@ void main() {
   n = normalize(n + relief * slope);
 #if defined(FINE) && !defined(INSIDE)
   // The film's border is round, and shines.
-  vec2 rise = vec2(dFdx(film), dFdy(film)) * 0.0006;
+  vec2 rise = vec2(dFdx(film), dFdy(film)) * 0.0004;
   vec3 lean = rise.x * along / max(dot(along, along), 1e-12) + rise.y * across / max(dot(across, across), 1e-12);
-  n = normalize(n - lean * min(1.0, 0.8 * inversesqrt(max(dot(lean, lean), 1e-6))));
+  n = normalize(n - lean * min(1.0, 0.5 * inversesqrt(max(dot(lean, lean), 1e-6))));
 #endif
   float facing = max(dot(n, view), 0.0);
 
@@ -281,9 +281,9 @@ void main() {
 #else
   vec2 share = mix(vec2(0.038, 0.62), vec2(0.034, 0.85), cover);
   // Blood is a mirror of the room, which is bright above.
-  float above = smoothstep(-0.35, 0.75, reflect(-view, n).y);
+  float above = smoothstep(-0.75, 0.70, reflect(-view, n).y);
   vec3 mirrored = hemisphere(reflect(-view, n)) * 0.55;
-  mirrored = mix(mirrored, vec3(1.10, 1.05, 1.00) * above * above, 0.75 * cover);
+  mirrored = mix(mirrored, vec3(1.50, 1.45, 1.40) * above * above, 0.8 * cover);
 #endif
   vec3 shine = key_colour * (reach * shade * open * (share.y * key_film.y + share.x * key_film.x));
   shine += fill_colour * ((0.26 * fill_film.y + 0.06 * fill_film.x) * open * others * kFillShine);

@@ -6,7 +6,7 @@
 namespace trocar::shape {
 namespace {
 
-constexpr int kEvenings = 5;  // each reaches as far as a drawn triangle
+constexpr int kEvenings = 8;  // each reaches as far as a drawn triangle
 
 float area_of(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
   return 0.5f * length(cross(b - a, c - a));

@@ -3,7 +3,9 @@
 // A coarse triangle surface made smooth for the eye: area-weighted vertex normals from the moving
 // triangles, then each edge halved once or twice with a midpoint that bulges as the normals say
 // (curved PN triangles, Vlachos et al. 2001, evaluated at edge midpoints). The vertices that the
-// server sent stay exactly where they are; only what lies between them is drawn rounder.
+// server sent stay exactly where they are; only what lies between them is drawn rounder. The one
+// exception are sharp borders of the organ, which tets make jagged: there a vertex is drawn at most
+// kMostLiftMetres along its normal from where it is, so that the border is a smooth line.
 //
 // Wound faces are smooth among each other and meet the outside at a rim: a vertex of both is drawn
 // twice, with a normal for either side. At the rim itself light sees a round lip, for which both
@@ -35,6 +37,7 @@ void compute_normals(std::span<const Vec3f> positions, std::span<const TriangleC
                      std::vector<Vec3f>& normals);
 
 // Widths of what a wound's rim changes on either side of it.
+inline constexpr float kMostLiftMetres = 0.0012f;  // of a vertex on a border
 inline constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;
 // Returns what the shaders take as `rest.w` of a vertex that is so far from the nearest rim:
 // outside 0, and -1 on the rim; inside 1 at the rim, 2 where the wound is deep.
@@ -49,6 +52,10 @@ class SmoothSurface {
   // with equal corners are left out. `is_wound` per triangle; empty: none.
   void build(std::size_t vertex_count, std::span<const TriangleCorners> triangles,
              std::span<const std::uint8_t> is_wound, std::size_t triangle_budget);
+
+  // Smooths the borders of what was built, as they are at rest; a wound's rim is none. Without this
+  // they are drawn as they are.
+  void smooth_borders(std::span<const Vec3f> rest);
 
   const std::vector<TriangleCorners>& triangles() const { return fine_triangles_; }
   // The first so many of the triangles are of the outside.
@@ -149,6 +156,7 @@ class SmoothSurface {
   std::vector<std::uint8_t> vertex_is_wound_, is_rim_;
   EdgeTable edges_;
   std::vector<Vec3f> positions_, normals_, lips_;
+  std::vector<float> lifts_;   // m along the normal, per coarse vertex; empty: none
   std::vector<Vec3f> bends_;   // normals that midpoints bulge by
   std::vector<Vec3f> spread_;  // averages of the wound's normals
 };

@@ -55,6 +55,7 @@ TEST(ClearEye, FliesThroughACutLiverAndIsNeverInIt) {
   const auto& cut = testing::cut_liver();
   SmoothSurface drawn;
   drawn.build(cut.positions.size(), cut.triangles, cut.layout.is_wound, 24'000);
+  drawn.smooth_borders(cut.rest);
   drawn.update(cut.positions);
   std::vector<Vec3f> wounds;  // in which a person looks around most
   for (std::size_t i = 0; i < cut.triangles.size(); ++i)

@@ -129,5 +129,22 @@ TEST_F(PaneTest, AnEyeInTheTissueStepsOut) {
   EXPECT_GT(length(view.eye), 0.04f);
 }
 
+TEST_F(PaneTest, FewerPixelsShowTheSameOrganInTheSamePlace) {
+  const auto redness = [&](float fineness) {
+    pane_->set_fineness(fineness);
+    pane_->draw(render::Quality::Live);
+    const auto image = context_->read_image();
+    std::vector<int> columns(64);
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+      columns[i / 3 % 640 / 10] += int{image.rgb[i]} - int{image.rgb[i + 1]};
+    return columns;
+  };
+  const auto fine = redness(1), coarse = redness(0.5f);
+  const int most = std::ranges::max(fine);
+  EXPECT_GT(most, 0);
+  EXPECT_NE(fine, coarse);
+  for (std::size_t i = 0; i < fine.size(); ++i) EXPECT_NEAR(fine[i], coarse[i], 0.1 * most) << i;
+}
+
 }  // namespace
 }  // namespace trocar::app

@@ -87,5 +87,72 @@ TEST(WoundLook, EightCutsHaveSmoothLips) {
   }
 }
 
+// A roof of 20 cells with rows of vertices at its slopes, whose ridge goes up and down by `jag_m`.
+struct Roof {
+  std::vector<Vec3f> rest;
+  std::vector<TriangleCorners> triangles;
+  static constexpr std::uint32_t kRows = 9, kColumns = 21, kRidge = 4;
+};
+
+Roof roof(float jag_m, float slope) {
+  Roof made;
+  for (std::uint32_t row = 0; row < Roof::kRows; ++row)
+    for (std::uint32_t column = 0; column < Roof::kColumns; ++column) {
+      const float across = 0.006f * (static_cast<float>(row) - Roof::kRidge);
+      const float jag = row != Roof::kRidge ? 0 : column % 2 == 0 ? jag_m : -jag_m;
+      made.rest.push_back(
+          {0.006f * static_cast<float>(column), jag - slope * std::abs(across), across});
+    }
+  for (std::uint32_t row = 0; row + 1 < Roof::kRows; ++row)
+    for (std::uint32_t column = 0; column + 1 < Roof::kColumns; ++column) {
+      const std::uint32_t a = row * Roof::kColumns + column, b = a + Roof::kColumns;
+      made.triangles.push_back({a, b, a + 1});
+      made.triangles.push_back({a + 1, b, b + 1});
+    }
+  return made;
+}
+
+TEST(Borders, ThatTetsMakeJaggedAreSmoothLines) {
+  const Roof made = roof(0.001f, 1.5f);
+  SmoothSurface surface;
+  surface.build(made.rest.size(), made.triangles, {}, 1);
+  surface.smooth_borders(made.rest);
+  surface.update(made.rest);
+  float high = -1, low = 1;
+  for (std::size_t v = 0; v < made.rest.size(); ++v) {
+    const std::size_t row = v / Roof::kColumns, column = v % Roof::kColumns;
+    EXPECT_LE(length(surface.positions()[v] - made.rest[v]), kMostLiftMetres * 1.001f);
+    if (row != Roof::kRidge) {
+      EXPECT_EQ(surface.positions()[v], made.rest[v]) << "no border";
+    } else if (column > 2 && column + 3 < Roof::kColumns) {
+      high = std::max(high, surface.positions()[v].y),
+      low = std::min(low, surface.positions()[v].y);
+    }
+  }
+  EXPECT_LT(high - low, 0.0005f) << "it went up and down by 2 mm";
+}
+
+TEST(Borders, AreNoneOnWhatIsRoundOrOnABox) {
+  for (const float slope : {0.1f, 0.0f}) {
+    const Roof made = roof(0, slope);
+    SmoothSurface surface;
+    surface.build(made.rest.size(), made.triangles, {}, 1);
+    surface.smooth_borders(made.rest);
+    surface.update(made.rest);
+    for (std::size_t v = 0; v < made.rest.size(); ++v)
+      EXPECT_EQ(surface.positions()[v], made.rest[v]);
+  }
+  const std::vector<Vec3f> box{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                               {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+  const std::vector<TriangleCorners> sides{{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7},
+                                           {0, 1, 5}, {0, 5, 4}, {2, 3, 7}, {2, 7, 6},
+                                           {1, 2, 6}, {1, 6, 5}, {0, 4, 7}, {0, 7, 3}};
+  SmoothSurface surface;
+  surface.build(box.size(), sides, {}, 1);
+  surface.smooth_borders(box);
+  surface.update(box);
+  EXPECT_TRUE(std::ranges::equal(box, std::span(surface.positions()).first(box.size())));
+}
+
 }  // namespace
 }  // namespace trocar::shape

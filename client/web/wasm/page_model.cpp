@@ -125,6 +125,7 @@ void PageModel::build_surface(std::size_t triangle_budget) {
   const auto& topology = replica_->topology();
   smooth_.build(topology.rest_positions.size(), topology.triangles, topology.is_wound,
                 triangle_budget);
+  smooth_.smooth_borders(topology.rest_positions);
   smooth_.update(topology.rest_positions);
   built_version_ = replica_->topology_version();
   built_budget_ = triangle_budget;
