@@ -192,15 +192,16 @@ void main() {
   float ground = 0.5 + (coarse.a - 0.5) * 0.9 + (fine.a - 0.5) * 0.5 + (grain.a - 0.5) * 0.35;
   float edge = (1.0 - spread) * 1.24 - 0.12;
   float patches = smoothstep(edge - 0.12, edge + 0.12, ground);
-  float film = blood_mm / max(spread, 0.02) * patches * (0.35 + 1.3 * coarse.a);
+  float film = blood_mm / max(spread, 0.02) * patches * (0.15 + 1.7 * coarse.a);
 #endif
   float cover = 1.0 - exp2(-45.0 * film);
-  float deep = 1.0 - exp2(-5.0 * film);
+  float deep = 1.0 - exp2(-3.2 * film);
 
   // Relief that is smaller than a pixel would only glitter; a film fills it.
   float relief = kRelief * figures.z * min(1.0, 0.35 / apart) * (1.0 - 0.6 * cover);
   vec3 slope = coarse.rgb + fine.rgb - 1.0 + (grain.rgb - 0.5) * 1.2;
-  n = normalize(n + relief * slope);
+  // Blood that runs down is not level.
+  n = normalize(n + relief * slope + 0.30 * cover * (coarse.rgb - 0.5));
 #if defined(FINE) && !defined(INSIDE)
   // The film's border is round, and shines.
   vec2 rise = vec2(dFdx(film), dFdy(film)) * 0.0004;
@@ -246,7 +247,7 @@ void main() {
   // Light passes the film twice: what is below it loses green and blue first, and where the film is
   // deep it is nearly black.
   vec3 through = exp2(vec3(-3.2, -45.0, -52.0) * film);
-  vec3 body = mix(vec3(0.120, 0.0042, 0.0032), vec3(0.034, 0.0008, 0.0008), deep);
+  vec3 body = mix(vec3(0.135, 0.0046, 0.0036), vec3(0.026, 0.0006, 0.0006), deep);
   albedo = albedo * through + body * (1.0 - through.g);
   wet = mix(wet, 1.25, cover);
 
