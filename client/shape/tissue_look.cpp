@@ -11,7 +11,9 @@ char lower(char c) {
 }
 
 bool has_word(std::string_view name, std::string_view word) {
-  return !std::ranges::search(name, word, {}, lower).empty();
+  const auto at = std::search(name.begin(), name.end(), word.begin(), word.end(),
+                              [](char a, char b) { return lower(a) == b; });
+  return at != name.end();
 }
 
 bool is_black(const Vec3f& c) {
