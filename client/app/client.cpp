@@ -115,6 +115,7 @@ Status Run::step(std::uint64_t now_ns) {
   if (picture_ && pace_.is_due(now_ns)) {
     picture_->draw(replica_, source_, hands_, now_ns);
     pace_.note_picture(now_ns, monotonic_ns());
+    picture_->set_fineness(pace_.fineness());
     if (const auto taken = take_screenshot(now_ns, false); !taken) return taken.error();
   }
   return {};

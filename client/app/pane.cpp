@@ -1,6 +1,7 @@
 #include "client/app/pane.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <numbers>
 
@@ -13,6 +14,9 @@ namespace {
 constexpr shape::Colour kLessonColour{240, 228, 66};
 constexpr float kFittingAspect = 1.3f;     // of a picture that an organ fits into
 constexpr float kLineHalfWidth = 0.0009f;  // m, as in a browser
+constexpr double kAimingZoom = 1.5;        // who starts as near wants to see the wound
+constexpr float kAimSeconds = 0.4f;
+constexpr std::size_t kWoundTriangles = 64;  // the newest ones are the wound that is worked at
 
 }  // namespace
 
@@ -56,6 +60,44 @@ void Pane::frame_camera(const replica::Replica& replica, const StartView& view) 
   const float aspect =
       static_cast<float>(region_.size.width) / static_cast<float>(std::max(region_.size.height, 1));
   if (aspect < kFittingAspect) camera_.zoom(kFittingAspect / std::max(aspect, 0.2f));
+  aims_ = view.zoom >= kAimingZoom;
+  aim(replica, 1);
+}
+
+std::optional<Vec3f> Pane::worked_wound(const replica::Replica& replica) const {
+  const auto& topology = replica.topology();
+  const auto& at = surface_.positions();
+  if (at.size() != topology.rest_positions.size()) return std::nullopt;
+  Vec3f sum;
+  std::size_t count = 0;
+  for (std::size_t i = topology.is_wound.size(); i-- > 0 && count < kWoundTriangles;) {
+    const auto& [a, b, c] = topology.triangles[i];
+    if (topology.is_wound[i] == 0 || a == b) continue;
+    sum += (at[a] + at[b] + at[c]) * (1.0f / 3);
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum * (1 / static_cast<float>(count));
+}
+
+void Pane::aim(const replica::Replica& replica, float share) {
+  if (!aims_) return;
+  if (const auto wound = worked_wound(replica))
+    camera_.aim_at(camera_.centre() + (*wound - camera_.centre()) * share);
+}
+
+void Pane::move_camera(const replica::Replica& replica, const device::PointerInput& input,
+                       float seconds) {
+  const bool zooms = (input.control && input.wheel != 0) || input.zoom_in != input.zoom_out;
+  if (zooms || input.right || input.middle) aims_ = false;
+  std::optional<Vec3f> focus;
+  if (zooms && surface_.positions().size() == replica.topology().rest_positions.size()) {
+    const auto view = camera_.rays(size());
+    const Vec3f ray = view.ray_through(input.x - static_cast<float>(region_.left), input.y);
+    const auto t = device::pick(surface_.positions(), replica.topology().triangles, view.eye, ray);
+    focus = t ? view.eye + ray * *t : worked_wound(replica);
+  }
+  camera_.update(input, size(), seconds, focus);
 }
 
 render::SceneTool Pane::scene_tool(const replica::Replica& replica, const replica::Tool& tool,
@@ -124,6 +166,8 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
   scene_.shows_arrows = look.overlays.arrows;
   if (surface_.is_valid()) {
     scene_.topology_version = replica.topology_version();
+    scene_.organ_name = replica.topology().organ_name;
+    scene_.held_vertices = replica.topology().fixed_vertices;
     scene_.rest_positions = replica.topology().rest_positions;
     scene_.triangles = replica.topology().triangles;
     scene_.is_wound = replica.topology().is_wound;
@@ -142,8 +186,10 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
       scene_.pointers.push_back({*target, kLessonColour});
     measured_.update(replica.topology(), replica.topology_version(), scene_.positions);
   }
+  aim(replica, 1 - std::exp(-look.seconds / kAimSeconds));
   find_lent_view(replica, look.is_recording);
   lent_.apply(scene_, camera_, look.is_recording);
+  camera_.keep_clear(scene_.positions, scene_.triangles, size());
 }
 
 void Pane::find_lent_view(const replica::Replica& replica, bool is_recording) {

@@ -36,12 +36,19 @@ class Pane {
   // is framed.
   bool update(const replica::Replica& replica, const StartView& view, std::uint64_t now_ns);
   void frame_camera(const replica::Replica& replica, const StartView& view);
+  // Zooms about what is under the pointer, else about the wound that is worked at. The pointer's
+  // place counts from the window's left.
+  void move_camera(const replica::Replica& replica, const device::PointerInput& input,
+                   float seconds);
+  // Somebody else says where the camera stands.
+  void cease_to_aim() { aims_ = false; }
   struct Look {
     const Overlays& overlays;
     float seconds = 0;  // since the last picture
     bool is_recording = false;
   };
   void make_scene(const replica::Replica& replica, const Hands& hands, const Look& look);
+  void set_fineness(float share) { renderer_.set_fineness(share); }
   // Draws into its region.
   void draw(render::Quality quality);
   // The region is the part of the window that it covers.
@@ -74,6 +81,9 @@ class Pane {
                                const Hands& hands) const;
   std::vector<render::Hold> holds(const replica::Replica& replica, bool shows_holds);
   void add_lines(const replica::Replica& replica);
+  // The middle of the newest wound; none: nobody has cut.
+  std::optional<Vec3f> worked_wound(const replica::Replica& replica) const;
+  void aim(const replica::Replica& replica, float share);
   void find_lent_view(const replica::Replica& replica, bool is_recording);
   // Returns where the point is that a lesson's hands follow.
   static std::optional<Vec3f> lesson_target(const replica::Replica& replica);
@@ -84,6 +94,7 @@ class Pane {
   replica::InterpolatedSurface surface_;
   replica::ForceHistory forces_;
   bool is_framed_ = false;  // the camera, when there is an organ
+  bool aims_ = false;       // at the wound that is worked at, until somebody moves the view
   std::uint64_t now_ns_ = 0;
   LentView lent_;
   std::string sees_with_;

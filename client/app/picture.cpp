@@ -189,7 +189,9 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
     leave_lent_views();
   }
   const auto& led = replica.led_view();
-  if (follows_view_ && led) pane_.camera().look(led->eye_m, led->target_m);
+  if (!follows_view_ || !led) return;
+  pane_.cease_to_aim();
+  pane_.camera().look(led->eye_m, led->target_m);
 }
 
 void Picture::move_mouse_tool(const replica::Replica& replica, Hands& hands,
@@ -239,7 +241,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   context_->poll_events();
   hud_.begin_frame(seconds);
   device::PointerInput input = hud_.input();
-  move_cameras(input, seconds);
+  move_cameras(replica, input, seconds);
   share_view(replica, source, input);
   // A hand that held its own camera and moved as that sees would chase itself.
   if (!pane_.lent().slot() || pane_.lent().slot()->owner() != replica.own_slot())

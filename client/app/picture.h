@@ -33,6 +33,8 @@ class Picture {
   // To be called often: frames pass faster than pictures are drawn.
   void observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns);
   bool should_close() const { return context_->should_close(); }
+  // Draws this share of the pixels along a side; a picture to keep has all of them.
+  void set_fineness(float share);
   bool is_software() const { return context_->is_software(); }
   std::uint64_t count() const { return count_; }
   // Draws once more what was drawn last, as finely as it goes, and returns it.
@@ -58,7 +60,8 @@ class Picture {
   void lay_out();
   void observe_beside();
   void update_beside(std::uint64_t now_ns);
-  void move_cameras(const device::PointerInput& input, float seconds);
+  void move_cameras(const replica::Replica& replica, const device::PointerInput& input,
+                    float seconds);
   void make_beside_scene(float seconds);
   void draw_panes(render::Quality quality);
   void stand_still();

@@ -57,21 +57,31 @@ void Picture::observe_beside() {
 }
 
 // One view is of both. With views of their own, each is moved where the pointer is.
-void Picture::move_cameras(const device::PointerInput& input, float seconds) {
-  if (!beside_) return pane_.camera().update(input, pane_.size(), seconds);
+void Picture::move_cameras(const replica::Replica& replica, const device::PointerInput& input,
+                           float seconds) {
+  if (!beside_) return pane_.move_camera(replica, input, seconds);
   const auto& other = beside_->pane;
   if (!input.left && !input.right && !input.middle)
     beside_->is_pointed_at = input.x >= static_cast<float>(other.region().left);
   const bool moves_other = beside_->has_own_view && beside_->is_pointed_at;
-  Pane& moved = moves_other ? beside_->pane : pane_;
-  moved.camera().update(input, moved.size(), seconds);
+  if (moves_other)
+    beside_->pane.move_camera(beside_->replica, input, seconds);
+  else
+    pane_.move_camera(replica, input, seconds);
 }
 
 void Picture::make_beside_scene(float seconds) {
   if (!beside_) return;
-  if (!beside_->has_own_view && pane_.is_framed() && beside_->pane.is_framed())
+  if (!beside_->has_own_view && pane_.is_framed() && beside_->pane.is_framed()) {
+    beside_->pane.cease_to_aim();
     beside_->pane.camera().stand_as(pane_.camera());
+  }
   beside_->pane.make_scene(beside_->replica, {}, {overlays_, seconds, true});
+}
+
+void Picture::set_fineness(float share) {
+  pane_.set_fineness(share);
+  if (beside_) beside_->pane.set_fineness(share);
 }
 
 void Picture::draw_panes(render::Quality quality) {

@@ -45,7 +45,7 @@ void main() {
     vec2 width = fwidth(p.xz);
     float weave = thread.x * thread.y * clamp(1.0 - max(width.x, width.y) / 0.0009, 0.0, 1.0);
     vec3 cloth = vec3(0.020, 0.082, 0.088) * (1.0 + 0.10 * weave + 0.9 * (slope.x + slope.y));
-    lit = cloth * (key_colour * max(dot(n, key_direction), 0.0) + 0.6 * hemisphere(n));
+    lit = cloth * (key_colour * max(dot(n, key_direction), 0.0) + 0.6 * hemisphere(n)) * key_light(t);
     // The lamp's pool, and the organ's own soft shadow on the cloth.
     float pool = exp(-0.13 * off * off);
     vec2 under = p.xz / (organ_size.xz + 0.55 * organ_size.y);
@@ -67,7 +67,7 @@ uniform float aspect;
 void main() {
   float r = length(ray.xy * vec2(aspect, 1.0));
   float edge = fwidth(r) * 1.5;
-  float dark = 0.45 * smoothstep(0.35, 1.0, r);
+  float dark = 0.38 * smoothstep(0.45, 1.0, r);
   colour = vec4(0.0, 0.0, 0.0, max(dark, smoothstep(0.97 - edge, 0.97 + edge, r)));
 }
 )";

@@ -57,20 +57,20 @@ void FineLayer::follow(const std::shared_ptr<const wire::FineSurface>& fine,
 }
 
 void FineLayer::upload(std::span<const Vec3f> positions, std::span<const Tint> tints,
-                       std::span<const float> covers) {
+                       std::span<const float> blood) {
   if (!surface_) return;
   surface_->update(positions);
   if (surface_->moved_count() == 0 && std::ranges::equal(tints, coarse_tints_) &&
-      std::ranges::equal(covers, coarse_covers_))
+      std::ranges::equal(blood, coarse_blood_))
     return;
   coarse_tints_.assign(tints.begin(), tints.end());
-  coarse_covers_.assign(covers.begin(), covers.end());
+  coarse_blood_.assign(blood.begin(), blood.end());
   surface_->spread(tints, tints_);
-  surface_->spread(covers, covers_);
+  surface_->spread(blood, blood_);
   const auto at = surface_->positions(), normals = surface_->normals();
   vertices_.resize(surface_->vertex_count());
   for (std::size_t i = 0; i < vertices_.size(); ++i)
-    vertices_[i] = organ_vertex(at[i], normals[i], tints_[i], normals[i], covers_[i]);
+    vertices_[i] = organ_vertex(at[i], normals[i], tints_[i], normals[i], blood_[i]);
   glBindBuffer(GL_ARRAY_BUFFER, buffer_);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices_.size() * sizeof(OrganVertex)),
                vertices_.data(), GL_STREAM_DRAW);

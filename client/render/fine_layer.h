@@ -29,10 +29,10 @@ class FineLayer {
   void follow(const std::shared_ptr<const wire::FineSurface>& fine,
               const embedding::CoarseShape& coarse, std::uint64_t topology_version);
   bool is_shown() const { return surface_.has_value(); }
-  // Moves it with the coarse vertices, m; tints and covers by blood are theirs. Nothing goes to the
-  // card if all are as they were.
+  // Moves it with the coarse vertices, m; tints and depths of blood, m, are theirs. Nothing goes to
+  // the card if all are as they were.
   void upload(std::span<const Vec3f> positions, std::span<const Tint> tints,
-              std::span<const float> covers);
+              std::span<const float> blood);
   unsigned picture() const { return picture_.name(); }  // 0: it has none
   // With the organ's shader in use.
   void draw() const;
@@ -52,10 +52,10 @@ class FineLayer {
   ImageTexture picture_;
   std::vector<RestVertex> rest_;
   std::vector<OrganVertex> vertices_;
-  std::vector<Tint> coarse_tints_;  // of the last upload, as are the covers
-  std::vector<float> coarse_covers_;
+  std::vector<Tint> coarse_tints_;  // of the last upload, as are the depths
+  std::vector<float> coarse_blood_;
   std::vector<Tint> tints_;
-  std::vector<float> covers_;
+  std::vector<float> blood_;
   GLuint array_ = 0, buffer_ = 0, rest_buffer_ = 0, index_buffer_ = 0;
 };
 

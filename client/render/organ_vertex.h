@@ -24,11 +24,11 @@ struct Tint {
 struct OrganVertex {
   Vec3f position, normal;  // m; of unit length
   std::array<std::uint8_t, 4> tint;
-  std::array<std::int8_t, 4> lip;  // a normal; w: how much of the surface blood covers
+  std::array<std::int8_t, 4> lip;  // shape::lip_bytes
 };
 
 inline OrganVertex organ_vertex(const Vec3f& position, const Vec3f& normal, const Tint& tint,
-                                const Vec3f& lip, float cover) {
+                                const Vec3f& lip, float blood_m) {
   const auto byte = [](float v) {
     return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255);
   };
@@ -36,7 +36,7 @@ inline OrganVertex organ_vertex(const Vec3f& position, const Vec3f& normal, cons
   return {position,
           normal,
           {byte(tint.r * whole), byte(tint.g * whole), byte(tint.b * whole), byte(tint.a)},
-          shape::lip_bytes(lip, cover)};
+          shape::lip_bytes(lip, blood_m)};
 }
 
 // Describes the bound buffer of OrganVertex to the bound vertex array.

@@ -8,12 +8,12 @@
 #include "client/render/field_source.h"
 #include "client/render/fine_layer.h"
 #include "client/render/gl.h"
+#include "client/render/organ_shaders.h"
 #include "client/render/organ_vertex.h"
 #include "client/render/shader.h"
 #include "client/render/shader_sources.h"
 #include "client/shape/blood_film.h"
 #include "client/shape/instrument_mesh.h"
-#include "client/shape/noise.h"
 #include "client/shape/smooth_surface.h"
 #include "common/wire/blood_codec.h"
 
@@ -29,8 +29,10 @@ constexpr float kOverlayStrength = 0.50f;
 constexpr float kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
 constexpr float kOverlayFadeSeconds = 0.12f;
 // The light of an endoscope does not reach far.
-constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
-constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
+constexpr float kScopeHazeFreeMetres = 0.05f, kScopeHazePerMetre = 4.0f;
+constexpr float kScopeLampMetres = 0.07f;  // over which it falls to half
+constexpr float kNearMetres = 0.30f;       // from what one looks at: then small detail is seen
+constexpr float kHazePerMiddle = 0.55f;    // over the distance of what one looks at
 constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
 
 Tint tint_of(Colour c) {
@@ -43,7 +45,7 @@ Tint tint_of(Colour c) {
 
 struct RestVertex {
   Vec3f position;
-  float rim = 0;  // as the shader says
+  float rim_and_part = 0;  // as the shader says
 };
 
 Matrix4 matrix_of(const Pose& pose) {
@@ -116,11 +118,20 @@ std::string lit(const char* head, const char* fragment_source) {
   return std::string(head) + kLightingSource + fragment_source;
 }
 
-void blit(GLuint from, GLuint to, Size size, int left = 0, int bottom = 0) {
+void blit(GLuint from, GLuint to, Size size, const Region& region) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, from);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to);
-  glBlitFramebuffer(0, 0, size.width, size.height, left, bottom, left + size.width,
-                    bottom + size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  const bool is_same = size.width == region.size.width && size.height == region.size.height;
+  glBlitFramebuffer(0, 0, size.width, size.height, region.left, region.bottom,
+                    region.left + region.size.width, region.bottom + region.size.height,
+                    GL_COLOR_BUFFER_BIT, is_same ? GL_NEAREST : GL_LINEAR);
+}
+
+Size scaled(Size size, float share) {
+  const auto part = [share](int side) {
+    return std::max(1, static_cast<int>(std::lround(static_cast<float>(side) * share)));
+  };
+  return {part(size.width), part(size.height)};
 }
 
 }  // namespace
@@ -132,14 +143,13 @@ std::optional<Vec3f> arrow_end(const Vec3f& tip, const Vec3f& force_n) {
 }
 
 struct SceneRenderer::Parts {
-  Shader fine_organ{kOrganVertexSource, lit(kFineHead, kOrganFragmentSource).c_str()};
-  Shader plain_organ{kOrganVertexSource, lit(kPlainHead, kOrganFragmentSource).c_str()};
+  OrganShaders organ;
   Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
   Shader field{kFieldVertexSource, lit(kPlainHead, kFieldFragmentSource).c_str()};
   Shader scope_mask{kFieldVertexSource, kScopeMaskSource};
   FineLayer fine;
   VertexArray organ_array, tool_array, field_array;
-  GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
+  GLuint rest_buffer = 0, index_buffer = 0;
   Target sharp, plain;  // with and without samples
   Target backdrop;      // the field alone, drawn when the view changes
   Matrix4 backdrop_view{};
@@ -155,7 +165,7 @@ struct SceneRenderer::Parts {
   std::size_t tinted = 0;   // coarse vertices from here on are new: they do not fade in
   std::vector<RestVertex> rest_vertices;
   std::vector<float> rim_distances;
-  std::vector<float> covers;  // by blood, 0 to 1
+  BloodFilm film;
   std::vector<OrganVertex> vertices;
   std::array<float, kMaxTools> jaw_openings{};
 
@@ -169,7 +179,9 @@ struct SceneRenderer::Parts {
   void draw_backdrop(const OrbitCamera& camera);
   void draw_scope_mask();
   void measure_organ(std::span<const Vec3f> rest_positions);
-  void draw_organ(const SceneView& scene, const OrbitCamera& camera, const Shader& organ);
+  void draw_organ(const SceneView& scene, const OrbitCamera& camera, Detail detail);
+  void draw_triangles(std::size_t first, std::size_t end) const;
+  void light_organ(const Shader& shader, const SceneView& scene, const OrbitCamera& camera) const;
   void draw_tools(const SceneView& scene, const OrbitCamera& camera);
   void draw_tool(const SceneTool& shown, float seconds);
   void draw_ghost(const SceneTool& shown);
@@ -209,22 +221,10 @@ SceneRenderer::Parts::Parts(const GlContext& context)
                         offset(offsetof(MeshVertex, material)));
   for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
   glBindVertexArray(0);
-
-  constexpr int kNoiseSize = 64;
-  const auto texels = make_tissue_noise(kNoiseSize);
-  glGenTextures(1, &noise);
-  glBindTexture(GL_TEXTURE_3D, noise);
-  glTexImage3D(GL_TEXTURE_3D, 0, GL_RGBA8, kNoiseSize, kNoiseSize, kNoiseSize, 0, GL_RGBA,
-               GL_UNSIGNED_BYTE, texels.data());
-  glTexParameteri(GL_TEXTURE_3D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  // Mip maps cost a software rasteriser a second look-up, and the pattern is never much smaller
-  // than a pixel.
-  glTexParameteri(GL_TEXTURE_3D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
 }
 
 SceneRenderer::Parts::~Parts() {
   for (Target* target : {&sharp, &plain, &backdrop}) target->release();
-  glDeleteTextures(1, &noise);
   glDeleteBuffers(1, &rest_buffer);
   glDeleteBuffers(1, &index_buffer);
 }
@@ -237,6 +237,7 @@ void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   topology_version = scene.topology_version;
   surface.build(scene.rest_positions.size(), scene.triangles, scene.is_wound,
                 is_software ? kTriangleBudgetSoftware : kTriangleBudget);
+  surface.smooth_borders(scene.rest_positions);
   surface.update(scene.rest_positions);
   tints.resize(known);
   tints.resize(surface.vertex_count());
@@ -244,9 +245,17 @@ void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   vertices.resize(surface.vertex_count());
   rest_vertices.resize(surface.vertex_count());
   surface.measure_rim(kDeepMetres, rim_distances);
+  const TissueLook& look = look_of(scene.organ_name);
+  organ.take_look(look);
+  std::vector<float> parts(surface.vertex_count());
+  const auto coarse_parts =
+      parts_of(look, scene.rest_positions.size(), scene.triangles, scene.held_vertices);
+  std::ranges::copy(coarse_parts, parts.begin());
+  surface.extend_values(parts);  // between two of one part there is that part
   for (std::size_t i = 0; i < rest_vertices.size(); ++i)
     rest_vertices[i] = {surface.positions()[i],
-                        rim_of(rim_distances[i], surface.is_wound()[i] != 0)};
+                        4 * parts[i] + rim_of(rim_distances[i], surface.is_wound()[i] != 0)};
+  film.build(surface, scene.rest_positions);
   measure_organ(scene.rest_positions);
   const auto bytes = [](std::size_t count, std::size_t each) {
     return static_cast<GLsizeiptr>(count * each);
@@ -277,15 +286,16 @@ void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
 void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
   surface.update(scene.positions);
   fade_tints(scene);
-  cover_with_blood(surface, scene.blood, static_cast<float>(wire::kBloodLevelMetres), covers);
+  film.spread(surface, scene.blood, static_cast<float>(wire::kBloodLevelMetres));
   for (std::size_t i = 0; i < vertices.size(); ++i)
     vertices[i] = organ_vertex(surface.positions()[i], surface.normals()[i], tints[i],
-                               surface.lips()[i], covers[i]);
+                               surface.lips()[i], film.depths()[i]);
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(OrganVertex)),
                vertices.data(), GL_STREAM_DRAW);
   const std::size_t coarse = surface.coarse_vertex_count();
-  fine.upload(scene.positions, std::span(tints).first(coarse), std::span(covers).first(coarse));
+  fine.upload(scene.positions, std::span(tints).first(coarse),
+              std::span(film.depths()).first(coarse));
 }
 
 void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& camera) const {
@@ -299,22 +309,17 @@ void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& c
   shader.set("key_direction",
              is_scope ? direction(0.05f, 0.12f, 1) : direction(0.42f, 0.88f, 0.55f));
   shader.set("fill_direction", direction(-0.9f, 0.15f, 0.35f));
+  shader.set("lamp", is_scope ? kScopeLampMetres : 0.0f);
 }
 
-void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera,
-                                      const Shader& organ) {
-  if (scene.positions.empty() || scene.positions.size() != surface.coarse_vertex_count()) return;
-  upload_organ(scene);
-  organ.use();
-  set_lights(organ, camera);
-  organ.set("noise", 0);
+void SceneRenderer::Parts::light_organ(const Shader& shader, const SceneView& scene,
+                                       const OrbitCamera& camera) const {
+  set_lights(shader, camera);
   const float middle = length(camera.centre() - camera.rays(size).eye);
   if (camera.lens() && camera.lens()->is_endoscope)
-    organ.set("haze", kScopeClearMetres, kScopeHazePerMetre);
+    shader.set("haze", kScopeHazeFreeMetres, kScopeHazePerMetre);
   else
-    organ.set("haze", middle, kHazePerMiddle / middle);
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_3D, noise);
+    shader.set("haze", middle, kHazePerMiddle / middle);
   std::vector<float> tips, shafts;
   const int shadow_count = std::min(kMaxShadows, static_cast<int>(scene.tools.size()));
   for (int i = 0; i < shadow_count; ++i) {
@@ -326,22 +331,45 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
     tips.insert(tips.end(), {p.x, p.y, p.z, width});
     shafts.insert(shafts.end(), {a.x, a.y, a.z, caster.shape.length_m});
   }
-  organ.set("shadow_count", shadow_count);
-  organ.set_array("shadow_tip", tips.data(), shadow_count);
-  organ.set_array("shadow_shaft", shafts.data(), shadow_count);
-  glEnable(GL_CULL_FACE);
-  // The fine surface takes the place of the outside.
-  const std::size_t first = fine.is_shown() ? surface.outer_triangle_count() : 0;
-  organ.set("picture", 1);
-  organ.set("has_picture", 0);
+  shader.set("shadow_count", shadow_count);
+  shader.set_array("shadow_tip", tips.data(), shadow_count);
+  shader.set_array("shadow_shaft", shafts.data(), shadow_count);
+}
+
+void SceneRenderer::Parts::draw_triangles(std::size_t first, std::size_t end) const {
   glBindVertexArray(organ_array.array);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>((surface.triangles().size() - first) * 3),
-                 GL_UNSIGNED_INT, offset(first * sizeof(TriangleCorners)));
-  organ.set("has_picture", fine.picture() != 0 ? 1 : 0);
-  glActiveTexture(GL_TEXTURE1);
-  glBindTexture(GL_TEXTURE_2D, fine.picture());
-  glActiveTexture(GL_TEXTURE0);
-  fine.draw();
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>((end - first) * 3), GL_UNSIGNED_INT,
+                 offset(first * sizeof(TriangleCorners)));
+}
+
+void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera,
+                                      Detail detail) {
+  if (scene.positions.empty() || scene.positions.size() != surface.coarse_vertex_count()) return;
+  upload_organ(scene);
+  const std::size_t outside = surface.outer_triangle_count(), all = surface.triangles().size();
+  glEnable(GL_CULL_FACE);
+  const Shader& outer = organ.use(Side::Outside, detail);
+  light_organ(outer, scene, camera);
+  // The fine surface takes the place of the outside.
+  if (fine.is_shown()) {
+    outer.set("has_picture", fine.picture() != 0 ? 1 : 0);
+    glActiveTexture(GL_TEXTURE1);
+    glBindTexture(GL_TEXTURE_2D, fine.picture());
+    glActiveTexture(GL_TEXTURE0);
+    fine.draw();
+  } else {
+    draw_triangles(0, outside);
+  }
+  if (all > outside) {
+    light_organ(organ.use(Side::Inside, detail), scene, camera);
+    draw_triangles(outside, all);
+  }
+  // Through gaps one sees backs, which the depth test hides everywhere else.
+  organ.backs().use();
+  set_lights(organ.backs(), camera);
+  glCullFace(GL_FRONT);
+  draw_triangles(fine.is_shown() ? outside : 0, all);
+  glCullFace(GL_BACK);
   glDisable(GL_CULL_FACE);
 }
 
@@ -474,10 +502,10 @@ void SceneRenderer::Parts::draw_scope_mask() {
 void SceneRenderer::Parts::draw_backdrop(const OrbitCamera& camera) {
   const Matrix4 view = camera.clip_from_world(size);
   const bool is_new = backdrop.resize(size);
-  const std::array organ{organ_centre, organ_size};
-  if (!is_new && view == backdrop_view && backdrop_organ == organ) return;
+  const std::array place{organ_centre, organ_size};
+  if (!is_new && view == backdrop_view && backdrop_organ == place) return;
   backdrop_view = view;
-  backdrop_organ = organ;
+  backdrop_organ = place;
   glBindFramebuffer(GL_FRAMEBUFFER, backdrop.framebuffer);
   draw_field(camera);
 }
@@ -485,9 +513,10 @@ void SceneRenderer::Parts::draw_backdrop(const OrbitCamera& camera) {
 void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, const Region& region,
                          Quality quality) {
   Parts& parts = *parts_;
-  parts.size = region.size;
+  if (region.size.width <= 0 || region.size.height <= 0) return;  // minimised
+  const bool is_sharp = quality == Quality::Best || !parts.is_software;
+  parts.size = is_sharp ? region.size : scaled(region.size, fineness_);
   const auto [width, height] = parts.size;
-  if (width <= 0 || height <= 0) return;  // minimised
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
   glDisable(GL_DEPTH_TEST);
@@ -495,7 +524,6 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
   if (scene.topology_version != parts.topology_version) parts.load_topology(scene);
   parts.fine.follow(scene.fine_surface, {scene.rest_positions, scene.triangles, scene.is_wound},
                     scene.topology_version);
-  const bool is_sharp = quality == Quality::Best || !parts.is_software;
   Target& target = is_sharp ? parts.sharp : parts.plain;
   target.resize(parts.size);
   if (is_sharp) {
@@ -503,18 +531,23 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
     parts.draw_field(camera);
   } else {
     parts.draw_backdrop(camera);
-    blit(parts.backdrop.framebuffer, target.framebuffer, parts.size);
+    blit(parts.backdrop.framebuffer, target.framebuffer, parts.size, {0, 0, parts.size});
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
   }
   glClear(GL_DEPTH_BUFFER_BIT);
   glEnable(GL_MULTISAMPLE);
   glEnable(GL_DEPTH_TEST);
-  parts.draw_organ(scene, camera, is_sharp ? parts.fine_organ : parts.plain_organ);
+  const bool is_near =
+      camera.lens() || length(camera.centre() - camera.rays(parts.size).eye) < kNearMetres;
+  parts.draw_organ(scene, camera,
+                   is_sharp  ? Detail::Fine
+                   : is_near ? Detail::PlainNear
+                             : Detail::Plain);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
   if (camera.lens() && camera.lens()->is_endoscope) parts.draw_scope_mask();
   glBindVertexArray(0);
-  blit(target.framebuffer, context_.framebuffer(), parts.size, region.left, region.bottom);
+  blit(target.framebuffer, context_.framebuffer(), parts.size, region);
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
 }
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "client/render/camera.h"
@@ -52,10 +53,12 @@ struct ScenePointer {
 
 struct SceneView {
   std::uint64_t topology_version = 0;  // changes when rest positions and triangles do
+  std::string_view organ_name;         // says what it looks like (shape/tissue_look.h)
   std::span<const Vec3f> rest_positions;
   std::span<const std::array<std::uint32_t, 3>>
-      triangles;                           // those with equal corners are not drawn
-  std::span<const std::uint8_t> is_wound;  // per triangle: shows the inside; may be empty
+      triangles;                                 // those with equal corners are not drawn
+  std::span<const std::uint8_t> is_wound;        // per triangle: shows the inside; may be empty
+  std::span<const std::uint32_t> held_vertices;  // that never move; may be empty
   std::shared_ptr<const wire::FineSurface> fine_surface;  // drawn instead of the outside; or null
   std::span<const Vec3f> positions;        // m, as many as rest_positions; empty: no organ yet
   std::span<const std::uint16_t> regions;  // per vertex; may be empty
@@ -82,6 +85,9 @@ class SceneRenderer {
   explicit SceneRenderer(const GlContext& context);
   ~SceneRenderer();
 
+  // Draws live pictures in software with this share of the pixels along a side, more than 0, at
+  // most 1.
+  void set_fineness(float share) { fineness_ = share; }
   // Into this part of the context's framebuffer.
   void draw(const SceneView& scene, const OrbitCamera& camera, const Region& region,
             Quality quality = Quality::Live);
@@ -91,6 +97,7 @@ class SceneRenderer {
  private:
   struct Parts;
   const GlContext& context_;
+  float fineness_ = 1;
   std::unique_ptr<Parts> parts_;
 };
 

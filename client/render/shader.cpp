@@ -64,5 +64,10 @@ void Shader::set(const char* name, const Matrix4& value) const {
 void Shader::set_array(const char* name, const float* values, int count) const {
   if (count > 0) glUniform4fv(glGetUniformLocation(program_, name), count, values);
 }
+void Shader::set_array(const char* name, std::span<const Vec3f> values) const {
+  static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+  glUniform3fv(glGetUniformLocation(program_, name), static_cast<GLsizei>(values.size()),
+               &values.front().x);
+}
 
 }  // namespace trocar::render

@@ -3,6 +3,8 @@
 // One GLSL 3.30 program. Source text is ours and compiled at start, so a failure is our bug (or a
 // driver's) and is asserted with the compiler's log.
 
+#include <span>
+
 #include "client/render/camera.h"
 #include "client/render/gl.h"
 
@@ -24,6 +26,8 @@ class Shader {
   void set(const char* name, const Matrix4& value) const;
   // The uniform is an array of vec4.
   void set_array(const char* name, const float* values, int count) const;
+  // The uniform is an array of vec3.
+  void set_array(const char* name, std::span<const Vec3f> values) const;
 
  private:
   GLuint program_ = 0;

@@ -102,6 +102,7 @@ void SmoothSurface::halve_edges() {
 void SmoothSurface::build(std::size_t vertex_count, std::span<const TriangleCorners> triangles,
                           std::span<const std::uint8_t> is_wound, std::size_t triangle_budget) {
   coarse_vertex_count_ = vertex_count;
+  lifts_.clear();
   midpoints_.clear();
   split_rim(triangles, is_wound);
   fine_triangles_ = coarse_triangles_;
@@ -115,6 +116,47 @@ void SmoothSurface::build(std::size_t vertex_count, std::span<const TriangleCorn
   for (const std::uint32_t v : rim_) is_rim_[v] = 1;
   for (const Midpoint& m : midpoints_)
     if (m.same_as != kNone) is_rim_[m.same_as] = 1;
+}
+
+// A vertex lies on a border where its faces turn away from each other. It is drawn towards the mean
+// of its neighbours that lie on the border, too.
+void SmoothSurface::smooth_borders(std::span<const Vec3f> rest) {
+  constexpr float kSharp = 0.80f;  // the cosine between a face and the mean of those around it
+  constexpr int kSteps = 3;
+  constexpr std::size_t kLeastFaces = 4;  // vertices for each that lies on a border
+  const auto outer = std::span(coarse_triangles_).first(first_wound_triangle_);
+  std::vector<Vec3f> normals;
+  compute_normals(rest, outer, normals);
+  std::vector<std::uint8_t> is_border(rest.size(), 0);
+  for (const auto& t : outer) {
+    const Vec3f face =
+        normalized(cross(rest[t[1]] - rest[t[0]], rest[t[2]] - rest[t[0]]) * 1e6f, normals[t[0]]);
+    for (const std::uint32_t v : t)
+      if (dot(face, normals[v]) < kSharp) is_border[v] = 1;
+  }
+  for (const std::uint32_t v : rim_) is_border[v] = 0;
+  // A body that is all borders is meant to be: boxes, rods.
+  const auto borders = static_cast<std::size_t>(std::ranges::count(is_border, 1));
+  if (borders * kLeastFaces > rest.size()) return;
+  std::vector<Vec3f> places(rest.begin(), rest.end()), sums;
+  std::vector<float> counts;
+  for (int step = 0; step < kSteps; ++step) {
+    sums.assign(rest.size(), Vec3f{});
+    counts.assign(rest.size(), 0);
+    for (const auto& t : outer)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+        if (is_border[a] == 0 || is_border[b] == 0) continue;
+        // Each edge comes twice, once for either triangle beside it.
+        sums[a] += places[b], counts[a] += 1;
+        sums[b] += places[a], counts[b] += 1;
+      }
+    for (std::size_t v = 0; v < rest.size(); ++v)
+      if (counts[v] >= 4) places[v] = (places[v] + sums[v] / counts[v]) * 0.5f;
+  }
+  lifts_.assign(rest.size(), 0);
+  for (std::size_t v = 0; v < rest.size(); ++v)
+    lifts_[v] = std::clamp(dot(places[v] - rest[v], normals[v]), -kMostLiftMetres, kMostLiftMetres);
 }
 
 // Each edge of the rim that was halved last learns where the rim goes on at its ends.
@@ -202,6 +244,11 @@ void SmoothSurface::update(std::span<const Vec3f> coarse_positions) {
   positions_.reserve(vertex_count());
   for (const std::uint32_t vertex : rim_) positions_.push_back(positions_[vertex]);
   compute_coarse_normals();
+  if (!lifts_.empty()) {
+    for (std::size_t v = 0; v < coarse_vertex_count_; ++v)
+      if (lifts_[v] != 0) positions_[v] += bends_[v] * lifts_[v];
+    compute_coarse_normals();
+  }
   normals_.reserve(vertex_count());
   lips_.reserve(vertex_count());
   bends_.reserve(vertex_count());

@@ -3,7 +3,9 @@
 // A coarse triangle surface made smooth for the eye: area-weighted vertex normals from the moving
 // triangles, then each edge halved once or twice with a midpoint that bulges as the normals say
 // (curved PN triangles, Vlachos et al. 2001, evaluated at edge midpoints). The vertices that the
-// server sent stay exactly where they are; only what lies between them is drawn rounder.
+// server sent stay exactly where they are; only what lies between them is drawn rounder. The one
+// exception are sharp borders of the organ, which tets make jagged: there a vertex is drawn at most
+// kMostLiftMetres along its normal from where it is, so that the border is a smooth line.
 //
 // Wound faces are smooth among each other and meet the outside at a rim: a vertex of both is drawn
 // twice, with a normal for either side. At the rim itself light sees a round lip, for which both
@@ -35,6 +37,7 @@ void compute_normals(std::span<const Vec3f> positions, std::span<const TriangleC
                      std::vector<Vec3f>& normals);
 
 // Widths of what a wound's rim changes on either side of it.
+inline constexpr float kMostLiftMetres = 0.0012f;  // of a vertex on a border
 inline constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;
 // Returns what the shaders take as `rest.w` of a vertex that is so far from the nearest rim:
 // outside 0, and -1 on the rim; inside 1 at the rim, 2 where the wound is deep.
@@ -50,6 +53,10 @@ class SmoothSurface {
   void build(std::size_t vertex_count, std::span<const TriangleCorners> triangles,
              std::span<const std::uint8_t> is_wound, std::size_t triangle_budget);
 
+  // Smooths the borders of what was built, as they are at rest; a wound's rim is none. Without this
+  // they are drawn as they are.
+  void smooth_borders(std::span<const Vec3f> rest);
+
   const std::vector<TriangleCorners>& triangles() const { return fine_triangles_; }
   // The first so many of the triangles are of the outside.
   std::size_t outer_triangle_count() const {
@@ -58,6 +65,12 @@ class SmoothSurface {
                : first_wound_triangle_ * (fine_triangles_.size() / coarse_triangles_.size());
   }
   std::size_t coarse_vertex_count() const { return coarse_vertex_count_; }
+  // These are halved: outer ones first; the wound's have their own copies of rim vertices. Each
+  // became the same number of triangles(), in this order.
+  std::span<const TriangleCorners> coarse_triangles() const { return coarse_triangles_; }
+  std::size_t coarse_outer_count() const { return first_wound_triangle_; }
+  // Coarse vertices of which the wound has copies, in the order of these.
+  std::span<const std::uint32_t> rim() const { return rim_; }
   std::size_t vertex_count() const {
     return coarse_vertex_count_ + rim_.size() + midpoints_.size();
   }
@@ -82,6 +95,12 @@ class SmoothSurface {
   void extend_values(std::vector<T>& values) const {
     std::size_t next = coarse_vertex_count_;
     for (const std::uint32_t vertex : rim_) values[next++] = values[vertex];
+    extend_midpoints(values);
+  }
+  // Extends them to midpoints alone: rim vertices have values of their own.
+  template <typename T>
+  void extend_midpoints(std::vector<T>& values) const {
+    std::size_t next = coarse_vertex_count_ + rim_.size();
     for (const Midpoint& m : midpoints_) values[next++] = (values[m.a] + values[m.b]) * 0.5f;
   }
 
@@ -137,6 +156,7 @@ class SmoothSurface {
   std::vector<std::uint8_t> vertex_is_wound_, is_rim_;
   EdgeTable edges_;
   std::vector<Vec3f> positions_, normals_, lips_;
+  std::vector<float> lifts_;   // m along the normal, per coarse vertex; empty: none
   std::vector<Vec3f> bends_;   // normals that midpoints bulge by
   std::vector<Vec3f> spread_;  // averages of the wound's normals
 };

@@ -20,7 +20,7 @@ constexpr LargeClass kLargeClasses[] = {
     {"client/net", "NetSource::Session", 118, "a connection, its return and its figures"},
     {"client/replay", "ReplaySource", 63, "two interfaces, that of a source and that of a player"},
     {"client/replica", "Replica", 115, "each message has a method, and most of them a member"},
-    {"client/web/wasm", "PageModel", 66, "each call of the page has a method"},
+    {"client/web/wasm", "PageModel", 65, "each call of the page has a method"},
     {"server/app/server", "Server", 62, "what a process has one of"},
     {"server/watch/bus", "Publisher", 56, "a connection to the bus, and what goes out on it"},
     {"server/watch/bus", "Tap", 58, "being a client that comes back, once more"},

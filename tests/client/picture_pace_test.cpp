@@ -41,5 +41,20 @@ TEST(PicturePace, YieldingKeepsTwentyPicturesASecondWhereItCan) {
   EXPECT_NEAR(pictures_in_a_second(yielding(15), 20), 15, 1) << "fewer are asked for";
 }
 
+float fineness_after(PicturePace pace, int pictures, std::uint64_t took_ms) {
+  for (int i = 0; i < pictures; ++i) pace.note_picture(0, took_ms * kMs);
+  return pace.fineness();
+}
+
+TEST(PicturePace, SlowPicturesGetFewerPixels) {
+  EXPECT_EQ(fineness_after(yielding(60), 500, 90), 1);
+  EXPECT_EQ(fineness_after(yielding(60), 20, 300), 1) << "a moment is no reason";
+  const float coarser = fineness_after(yielding(60), 24, 200);
+  EXPECT_LT(coarser, 1);
+  EXPECT_LT(fineness_after(yielding(60), 48, 200), coarser);
+  EXPECT_GE(fineness_after(yielding(60), 1000, 900), 0.5f) << "it stays a picture";
+  EXPECT_EQ(fineness_after(PicturePace(60), 1000, 900), 1) << "a graphics processor draws all";
+}
+
 }  // namespace
 }  // namespace trocar::app

@@ -17,9 +17,7 @@
 #include <numbers>
 
 #include "client/shape/smooth_surface.h"
-#include "common/tool/script.h"
-#include "server/organs/catalogue/builtin_organs.h"
-#include "server/tissue/step/simulation.h"
+#include "tests/client/cut_liver.h"
 
 namespace trocar::shape {
 namespace {
@@ -28,58 +26,6 @@ constexpr float kAcrossTheRim = 30, kWithinATriangle = 90, kFromTheFace = 90;  /
 
 float degrees_between(const Vec3f& a, const Vec3f& b) {
   return std::acos(std::clamp(dot(a, b), -1.0f, 1.0f)) * 180 / std::numbers::pi_v<float>;
-}
-
-// The liver after deploy/scenes/eight-cuts.toml, as a client gets it.
-struct CutLiver {
-  wire::SurfaceLayout layout;
-  std::vector<Vec3f> positions;
-  std::vector<TriangleCorners> triangles;
-};
-
-CutLiver cut_liver() {
-  step::Simulation simulation(*catalogue::make_liver());
-  const auto script = tool::parse_script(TROCAR_SOURCE_DIR "/deploy/scenes/eight-cuts.toml");
-  EXPECT_TRUE(script.ok());
-  const auto& mesh = simulation.organ().mesh;
-  std::vector<Vec3f> rest;
-  for (const auto& p : mesh.rest_positions) rest.push_back(to_float(p));
-  std::vector<tool::SurfaceTriangle> surface;
-  for (const auto& [a, b, c] : mesh.boundary_triangles)
-    surface.push_back({a.value, b.value, c.value});
-  hands::HandJoin join{.slot = {0}, .tool_count = static_cast<int>(script->tools.size())};
-  std::vector<tool::AnchorPoint> anchors;
-  Tick last = 0;
-  for (std::size_t t = 0; t < script->tools.size(); ++t) {
-    join.shapes[t] = script->tools[t].shape;
-    anchors.push_back(*tool::find_anchor(*script->tools[t].anchor, rest, surface));
-    last = std::max(last, static_cast<Tick>(script->tools[t].keys.back().time_s * 1e3));
-  }
-  CutLiver cut;
-  for (Tick tick = 1; tick <= last; ++tick) {
-    hands::TickInputs inputs;
-    if (tick == 1) inputs.joins.push_back(join);
-    for (std::size_t t = 0; t < script->tools.size() && tick % 8 == 1; ++t)
-      inputs.samples.push_back(
-          {tool_slot({0}, static_cast<int>(t)),
-           tool::sample(script->tools[t], static_cast<double>(tick) * 1e-3, anchors[t])});
-    simulation.tick(inputs, {});
-    if (const auto frame = simulation.pop_frame()) {
-      cut.positions.clear();
-      for (const auto& q : frame->surface) cut.positions.push_back(wire::to_metres(q));
-    }
-  }
-  cut.layout = simulation.layout();
-  cut.positions.resize(cut.layout.vertex_count());
-  for (std::size_t i = 0; i < cut.positions.size(); ++i)
-    cut.positions[i] += wire::to_metres(cut.layout.rest_quanta[i]);
-  for (std::size_t i = 0; i < cut.layout.triangles.size(); ++i) {
-    const auto& t = cut.layout.triangles[i];
-    cut.triangles.push_back({});
-    if (cut.layout.has_triangle(TriangleIndex(i)))
-      cut.triangles.back() = {t[0].value, t[1].value, t[2].value};
-  }
-  return cut;
 }
 
 struct Jumps {
@@ -125,7 +71,7 @@ Jumps count_jumps(const SmoothSurface& surface) {
 }
 
 TEST(WoundLook, EightCutsHaveSmoothLips) {
-  const CutLiver cut = cut_liver();
+  const testing::CutLiver& cut = testing::cut_liver();
   ASSERT_GT(std::ranges::count(cut.layout.is_wound, 1), 200);
   SmoothSurface surface;
   for (const std::size_t budget : {std::size_t{24'000}, std::size_t{100'000}}) {
@@ -139,6 +85,73 @@ TEST(WoundLook, EightCutsHaveSmoothLips) {
     EXPECT_EQ(jumps.across, 0);
     EXPECT_EQ(jumps.within, 0);
   }
+}
+
+// A roof of 20 cells with rows of vertices at its slopes, whose ridge goes up and down by `jag_m`.
+struct Roof {
+  std::vector<Vec3f> rest;
+  std::vector<TriangleCorners> triangles;
+  static constexpr std::uint32_t kRows = 9, kColumns = 21, kRidge = 4;
+};
+
+Roof roof(float jag_m, float slope) {
+  Roof made;
+  for (std::uint32_t row = 0; row < Roof::kRows; ++row)
+    for (std::uint32_t column = 0; column < Roof::kColumns; ++column) {
+      const float across = 0.006f * (static_cast<float>(row) - Roof::kRidge);
+      const float jag = row != Roof::kRidge ? 0 : column % 2 == 0 ? jag_m : -jag_m;
+      made.rest.push_back(
+          {0.006f * static_cast<float>(column), jag - slope * std::abs(across), across});
+    }
+  for (std::uint32_t row = 0; row + 1 < Roof::kRows; ++row)
+    for (std::uint32_t column = 0; column + 1 < Roof::kColumns; ++column) {
+      const std::uint32_t a = row * Roof::kColumns + column, b = a + Roof::kColumns;
+      made.triangles.push_back({a, b, a + 1});
+      made.triangles.push_back({a + 1, b, b + 1});
+    }
+  return made;
+}
+
+TEST(Borders, ThatTetsMakeJaggedAreSmoothLines) {
+  const Roof made = roof(0.001f, 1.5f);
+  SmoothSurface surface;
+  surface.build(made.rest.size(), made.triangles, {}, 1);
+  surface.smooth_borders(made.rest);
+  surface.update(made.rest);
+  float high = -1, low = 1;
+  for (std::size_t v = 0; v < made.rest.size(); ++v) {
+    const std::size_t row = v / Roof::kColumns, column = v % Roof::kColumns;
+    EXPECT_LE(length(surface.positions()[v] - made.rest[v]), kMostLiftMetres * 1.001f);
+    if (row != Roof::kRidge) {
+      EXPECT_EQ(surface.positions()[v], made.rest[v]) << "no border";
+    } else if (column > 2 && column + 3 < Roof::kColumns) {
+      high = std::max(high, surface.positions()[v].y),
+      low = std::min(low, surface.positions()[v].y);
+    }
+  }
+  EXPECT_LT(high - low, 0.0005f) << "it went up and down by 2 mm";
+}
+
+TEST(Borders, AreNoneOnWhatIsRoundOrOnABox) {
+  for (const float slope : {0.1f, 0.0f}) {
+    const Roof made = roof(0, slope);
+    SmoothSurface surface;
+    surface.build(made.rest.size(), made.triangles, {}, 1);
+    surface.smooth_borders(made.rest);
+    surface.update(made.rest);
+    for (std::size_t v = 0; v < made.rest.size(); ++v)
+      EXPECT_EQ(surface.positions()[v], made.rest[v]);
+  }
+  const std::vector<Vec3f> box{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                               {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+  const std::vector<TriangleCorners> sides{{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7},
+                                           {0, 1, 5}, {0, 5, 4}, {2, 3, 7}, {2, 7, 6},
+                                           {1, 2, 6}, {1, 6, 5}, {0, 4, 7}, {0, 7, 3}};
+  SmoothSurface surface;
+  surface.build(box.size(), sides, {}, 1);
+  surface.smooth_borders(box);
+  surface.update(box);
+  EXPECT_TRUE(std::ranges::equal(box, std::span(surface.positions()).first(box.size())));
 }
 
 }  // namespace

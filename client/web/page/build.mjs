@@ -21,6 +21,7 @@ function extractShaders(headers, to) {
     'LightingSource',
     'OrganVertexSource',
     'OrganFragmentSource',
+    'BackFragmentSource',
     'ToolVertexSource',
     'ToolFragmentSource',
     'FieldVertexSource',

@@ -1,6 +1,8 @@
 // The functions that JavaScript calls, client/web/page/src/replica.ts: numbers and places in the
 // module's memory. A page has one model.
 
+#include <cmath>
+
 #include "client/shape/noise.h"
 #include "client/web/wasm/page_hand.h"
 #include "client/web/wasm/page_model.h"
@@ -52,6 +54,8 @@ shape::Colour colour_of(std::uint32_t rgb) {
 
 std::size_t mesh_count = 0;
 std::array<float, 11> lens_figures{};
+std::array<float, 2> clear_figures{};
+shape::LookFigures look_figures;
 
 const void* hand_out(const shape::MeshVertices& mesh) {
   mesh_count = mesh.size();
@@ -317,6 +321,16 @@ TROCAR_EXPORT(lens) const float* trocar_lens(int slot, float radius_m, std::uint
                   lens.is_endoscope ? 1.0f : 0.0f};
   return lens_figures.data();
 }
+// By how much an eye has to step back out of tissue, m, and how far tissue is then at least. Its
+// direction: an angle from z towards x, and one upwards.
+TROCAR_EXPORT(clear_eye)
+const float* trocar_clear_eye(float x, float y, float z, float yaw, float pitch, bool is_lens) {
+  const Vec3f forward{std::sin(yaw) * std::cos(pitch), std::sin(pitch),
+                      std::cos(yaw) * std::cos(pitch)};
+  const auto clear = model().clear_eye({x, y, z}, forward, is_lens);
+  clear_figures = {clear.back_m, clear.nearest_m};
+  return clear_figures.data();
+}
 TROCAR_EXPORT(make_arrow)
 const void* trocar_make_arrow(float length_m, float radius_m, std::uint32_t colour) {
   return hand_out(model().make_arrow(length_m, radius_m, colour_of(colour)));
@@ -337,6 +351,16 @@ TROCAR_EXPORT(pointer_colour) std::uint32_t trocar_pointer_colour(int slot) {
   const auto colour = shape::colour_of_pointer(slot < 0 ? 0 : slot);
   return static_cast<std::uint32_t>(colour.r) << 16 | static_cast<std::uint32_t>(colour.g) << 8 |
          colour.b;
+}
+// Returns shape::LookFigures of the outside, or of the inside, as floats.
+TROCAR_EXPORT(look) const void* trocar_look(bool is_inside) {
+  const auto& look = model().look();
+  look_figures = is_inside ? shape::inside_figures(look) : shape::outside_figures(look);
+  return &look_figures;
+}
+TROCAR_EXPORT(lobules) const std::uint8_t* trocar_lobules(int size) {
+  noise_texels = shape::make_lobule_noise(size);
+  return noise_texels.data();
 }
 TROCAR_EXPORT(noise) const std::uint8_t* trocar_noise(int size) {
   noise_texels = shape::make_tissue_noise(size);

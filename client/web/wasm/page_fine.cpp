@@ -87,22 +87,22 @@ void PageFine::follow(const embedding::CoarseShape& coarse, std::uint64_t topolo
 }
 
 void PageFine::update(std::span<const Vec3f> positions, std::span<const PageTint> tints,
-                      std::span<const float> covers) {
+                      std::span<const float> blood) {
   if (!surface_) return;
   surface_->update(positions);
   const std::size_t vertices = surface_->vertex_count();
   if (surface_->moved_count() == 0 && lips_.size() == vertices &&
-      std::ranges::equal(tints, coarse_tints_) && std::ranges::equal(covers, coarse_covers_))
+      std::ranges::equal(tints, coarse_tints_) && std::ranges::equal(blood, coarse_blood_))
     return;
   ++motion_version_;
   coarse_tints_.assign(tints.begin(), tints.end());
-  coarse_covers_.assign(covers.begin(), covers.end());
+  coarse_blood_.assign(blood.begin(), blood.end());
   surface_->spread(tints, tints_);
-  surface_->spread(covers, covers_);
+  surface_->spread(blood, blood_);
   lips_.resize(vertices);
   overlay_.resize(vertices);
   for (std::size_t i = 0; i < vertices; ++i) {
-    lips_[i] = shape::lip_bytes(surface_->normals()[i], covers_[i]);
+    lips_[i] = shape::lip_bytes(surface_->normals()[i], blood_[i]);
     overlay_[i] = bytes_of(tints_[i]);
   }
 }

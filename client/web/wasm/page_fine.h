@@ -42,9 +42,9 @@ class PageFine {
 
   // Takes over the coarse surface as it is, if it has changed since the last call.
   void follow(const embedding::CoarseShape& coarse, std::uint64_t topology_version);
-  // Moves it with the coarse vertices, m; tints and covers by blood are theirs.
+  // Moves it with the coarse vertices, m; tints and depths of blood, m, are theirs.
   void update(std::span<const Vec3f> positions, std::span<const PageTint> tints,
-              std::span<const float> covers);
+              std::span<const float> blood);
 
   // True once an update has filled what follows.
   bool is_shown() const { return surface_ && lips_.size() == surface_->vertex_count(); }
@@ -76,8 +76,8 @@ class PageFine {
   std::vector<std::array<float, 2>> texture_;
   std::vector<std::array<std::int8_t, 4>> lips_;
   std::vector<Bytes4> overlay_;
-  std::vector<PageTint> coarse_tints_, tints_;  // coarse: of the last update, as are the covers
-  std::vector<float> coarse_covers_, covers_;
+  std::vector<PageTint> coarse_tints_, tints_;  // coarse: of the last update, as are the depths
+  std::vector<float> coarse_blood_, blood_;
 };
 
 }  // namespace trocar::wasm

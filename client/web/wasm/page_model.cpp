@@ -125,24 +125,32 @@ void PageModel::build_surface(std::size_t triangle_budget) {
   const auto& topology = replica_->topology();
   smooth_.build(topology.rest_positions.size(), topology.triangles, topology.is_wound,
                 triangle_budget);
+  smooth_.smooth_borders(topology.rest_positions);
   smooth_.update(topology.rest_positions);
   built_version_ = replica_->topology_version();
   built_budget_ = triangle_budget;
   ++geometry_version_;
-  rest_.resize(smooth_.vertex_count());
-  smooth_.measure_rim(shape::kDeepMetres, rim_distances_);
-  for (std::size_t i = 0; i < rest_.size(); ++i) {
+  attributes_.rest.resize(smooth_.vertex_count());
+  smooth_.measure_rim(shape::kDeepMetres, attributes_.rim_distances);
+  attributes_.parts.resize(smooth_.vertex_count());
+  std::ranges::copy(shape::parts_of(look(), topology.rest_positions.size(), topology.triangles,
+                                    topology.fixed_vertices),
+                    attributes_.parts.begin());
+  smooth_.extend_values(attributes_.parts);
+  for (std::size_t i = 0; i < attributes_.rest.size(); ++i) {
     const Vec3f& p = smooth_.positions()[i];
-    rest_[i] = {p.x, p.y, p.z, shape::rim_of(rim_distances_[i], smooth_.is_wound()[i] != 0)};
+    attributes_.rest[i] = {p.x, p.y, p.z,
+                           4 * attributes_.parts[i] + shape::rim_of(attributes_.rim_distances[i],
+                                                                    smooth_.is_wound()[i] != 0)};
   }
+  attributes_.film.build(smooth_, topology.rest_positions);
 }
 
 void PageModel::update_figures() {
-  shape::cover_with_blood(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres),
-                          covers_);
-  lips_.resize(smooth_.vertex_count());
-  for (std::size_t i = 0; i < lips_.size(); ++i)
-    lips_[i] = shape::lip_bytes(smooth_.lips()[i], covers_[i]);
+  attributes_.film.spread(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres));
+  attributes_.lips.resize(smooth_.vertex_count());
+  for (std::size_t i = 0; i < attributes_.lips.size(); ++i)
+    attributes_.lips[i] = shape::lip_bytes(smooth_.lips()[i], attributes_.film.depths()[i]);
   const auto* newest = replica_->newest();
   if (newest == nullptr || !newest->has_state) return;  // its figures come in a moment
   waiting_tools_ = newest->figures.pace.rate.waiting_tools;
@@ -213,7 +221,7 @@ void PageModel::update_fine() {
   fine_.follow({topology.rest_positions, topology.triangles, topology.is_wound},
                replica_->topology_version());
   fine_.update(shown_->positions(), std::span(tints_).first(coarse),
-               std::span(covers_).first(coarse));
+               std::span(attributes_.film.depths()).first(coarse));
 }
 
 void PageModel::update_drawing() {
@@ -274,6 +282,13 @@ shape::Lens PageModel::lens_of(std::uint8_t slot, const tool::ToolShape& shape) 
   for (const auto& tool : shown_->tools())
     if (tool.slot.value == slot) world_from_tool = tool.world_from_proxy;
   return shape::lens_of(world_from_tool, shape);
+}
+
+shape::ClearEye PageModel::clear_eye(const Vec3f& eye, const Vec3f& forward, bool is_lens) const {
+  const auto& topology = replica_->topology();
+  if (shown_->positions().size() != topology.rest_positions.size()) return {0, shape::kLookMetres};
+  return shape::clear_eye(eye, forward, shown_->positions(), topology.triangles,
+                          is_lens ? shape::kScopeClearMetres : shape::kClearMetres);
 }
 
 const shape::MeshVertices& PageModel::make_hand_line(float length, shape::Colour colour) {

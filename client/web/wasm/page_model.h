@@ -19,10 +19,12 @@
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
 #include "client/shape/blood_film.h"
+#include "client/shape/clear_eye.h"
 #include "client/shape/instrument_mesh.h"
 #include "client/shape/lens.h"
 #include "client/shape/ribbon.h"
 #include "client/shape/smooth_surface.h"
+#include "client/shape/tissue_look.h"
 #include "client/shape/tool_mesh.h"
 #include "client/web/wasm/page_fine.h"
 #include "common/base/bytes.h"
@@ -89,11 +91,13 @@ class PageModel {
   const shape::SmoothSurface& surface() const { return smooth_; }
   // It takes the place of the outside, where it is shown.
   const PageFine& fine() const { return fine_; }
-  // Returns x, y, z at rest, and shape::rim_of.
-  std::span<const std::array<float, 4>> rest() const { return rest_; }
+  // Says what the organ looks like.
+  const shape::TissueLook& look() const { return shape::look_of(replica_->topology().organ_name); }
+  // Returns x, y, z at rest, and shape::rim_of with four times the number of the part.
+  std::span<const std::array<float, 4>> rest() const { return attributes_.rest; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
   // Returns shape::lip_bytes, with the blood of this moment.
-  std::span<const std::array<std::int8_t, 4>> lips() const { return lips_; }
+  std::span<const std::array<std::int8_t, 4>> lips() const { return attributes_.lips; }
   // Returns what the newest frame says of blood; null: the session does not bleed.
   const PageBlood* blood() const { return blood_ ? &*blood_ : nullptr; }
   // Returns wire::RateFigures::waiting_tools of the newest frame.
@@ -119,6 +123,8 @@ class PageModel {
   // Returns how somebody sees with the tool in that slot, where it is shown now.
   shape::Lens lens_of(std::uint8_t slot, const tool::ToolShape& shape) const;
   const shape::MeshVertices& make_arrow(float length, float radius, shape::Colour colour);
+  // Keeps an eye out of the tissue as it is shown now.
+  shape::ClearEye clear_eye(const Vec3f& eye, const Vec3f& forward, bool is_lens) const;
 
  private:
   bool accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes);
@@ -136,13 +142,17 @@ class PageModel {
   shape::SmoothSurface smooth_;
   std::uint64_t built_version_ = 0, geometry_version_ = 0;
   std::size_t built_budget_ = 0;
-  std::vector<std::array<float, 4>> rest_;
-  std::vector<float> rim_distances_;
+  // The shader takes these of each vertex.
+  struct Attributes {
+    std::vector<std::array<float, 4>> rest;
+    std::vector<float> rim_distances, parts;
+    shape::BloodFilm film;
+    std::vector<std::array<std::int8_t, 4>> lips;
+  };
+  Attributes attributes_;
   std::vector<PageTint> tints_;
   PageFine fine_;
   std::vector<std::array<std::uint8_t, 4>> overlay_;
-  std::vector<float> covers_;  // by blood, 0 to 1
-  std::vector<std::array<std::int8_t, 4>> lips_;
   std::optional<PageBlood> blood_;
   std::uint32_t waiting_tools_ = 0;
   std::vector<PageTool> tools_;

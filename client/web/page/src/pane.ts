@@ -1,11 +1,13 @@
 // One of the views of a picture: a part of the canvas, where it looks from, and whom it follows.
 
 import { PerspectiveCamera, Quaternion, Vector3 } from 'three';
-import type { Lens, Tool } from './replica';
+import type { Lens, Replica, Tool } from './replica';
 
 const kSettleSeconds = 0.15;
 const kBehind = 0.24,
   kAbove = 0.07; // m from the tip, of a view along a tool
+const kNear = 0.02,
+  kLensNear = 0.003; // m, where no tissue is nearer
 
 export type ViewCount = 1 | 2 | 4;
 // Left, top, width and height as shares of the canvas, from its upper left.
@@ -33,14 +35,14 @@ export function partsOf(count: ViewCount, isHigh: boolean): Part[] {
 }
 
 export class Pane {
-  readonly camera = new PerspectiveCamera(32.0, 1, 0.02, 6);
+  readonly camera = new PerspectiveCamera(32.0, 1, kNear, 6);
   readonly target = new Vector3();
   part: Part = [0, 0, 1, 1];
   follows: number | null = null; // a participant's slot
   isAlong = false; // it looks along that one's tool, instead of keeping its direction
   isFramed = false;
   seesWith: number | null = null; // the slot of a tool, in place of its own camera
-  private readonly lensCamera = new PerspectiveCamera(70, 1, 0.003, 6);
+  private readonly lensCamera = new PerspectiveCamera(70, 1, kLensNear, 6);
   private lens: Lens | null = null;
 
   // `yaw` turns a view around the organ, so that several differ; `pitch` is how far from above.
@@ -67,6 +69,25 @@ export class Pane {
     c.fov = (Math.atan(lens.tanHalfHeight) * 360) / Math.PI;
     c.aspect = this.camera.aspect;
     c.updateProjectionMatrix();
+  }
+
+  // Steps back out of tissue, and lets the near plane cut none of it away.
+  keepClear(replica: Replica): void {
+    const camera = this.drawn,
+      forward = camera.getWorldDirection(new Vector3()),
+      { x, y, z } = camera.position;
+    const [back, nearest] = replica.clearEye(
+      [x, y, z],
+      [forward.x, forward.y, forward.z],
+      this.lens !== null,
+    );
+    camera.position.addScaledVector(forward, -back);
+    const up = Math.tan((camera.fov * Math.PI) / 360),
+      usual = this.lens ? kLensNear : kNear,
+      near = Math.min(usual, nearest / Math.hypot(1, up, up * camera.aspect));
+    if (near === camera.near) return;
+    camera.near = near;
+    camera.updateProjectionMatrix();
   }
 
   has(x: number, y: number): boolean {

@@ -88,11 +88,14 @@ interface Exports {
   jaw_opening(form: number, verb: number, hasClaim: boolean): number;
   jaw_seconds(form: number, verb: number, hasClaim: boolean): number;
   lens(slot: number, radiusM: number, form: number): number;
+  clear_eye(x: number, y: number, z: number, yaw: number, pitch: number, isLens: boolean): number;
+  look(isInside: boolean): number;
   make_arrow(lengthM: number, radiusM: number, colour: number): number;
   make_hand_line(lengthM: number, colour: number): number;
   mesh_vertices(): number;
   slot_colour(slot: number): number;
   noise(size: number): number;
+  lobules(size: number): number;
 }
 
 export type Vec3 = [number, number, number];
@@ -106,6 +109,13 @@ export const enum Verb {
   Push = 1,
   Grasp = 2,
   Cut = 3,
+}
+
+export interface Look {
+  dark: Float32Array;
+  light: Float32Array;
+  lines: Float32Array;
+  figures: Float32Array;
 }
 
 export interface Tool {
@@ -322,8 +332,8 @@ export class Replica {
   normals(): Float32Array {
     return this.floats(this.e.normals_at(), this.e.vertices() * 3);
   }
-  // The normals of wounds' rims, elsewhere as normals(), and how much blood covers, in shares of
-  // 127.
+  // The normals of wounds' rims, elsewhere as normals(), and the cube root of how deep blood
+  // stands, of 5.1 mm, in shares of 127.
   lips(): Int8Array {
     return new Int8Array(this.e.memory.buffer, this.e.lips_at(), this.e.vertices() * 4);
   }
@@ -527,6 +537,24 @@ export class Replica {
       isEndoscope: at(10) > 0,
     };
   }
+  // By how much an eye has to step back out of tissue, m, and how far tissue is then at least.
+  // `forward` is of unit length.
+  clearEye(eye: Vec3, [x, y, z]: Vec3, isLens: boolean): [number, number] {
+    const at = this.e.clear_eye(...eye, Math.atan2(x, z), Math.asin(y), isLens),
+      [back = 0, nearest = 0] = this.floats(at, 2);
+    return [back, nearest];
+  }
+  // What the organ looks like, outside or where it is cut: colours of its parts in the troughs of
+  // its pattern, on its heights, of lines on it; and figures.
+  look(isInside: boolean): Look {
+    const f = this.floats(this.e.look(isInside), 32).slice();
+    return {
+      dark: f.subarray(0, 12),
+      light: f.subarray(12, 24),
+      lines: f.subarray(24, 28),
+      figures: f.subarray(28, 32),
+    };
+  }
   makeArrow(lengthM: number, radiusM: number, colour: number): Mesh {
     return this.mesh(this.e.make_arrow(lengthM, radiusM, colour));
   }
@@ -538,8 +566,10 @@ export class Replica {
   slotColour(slot: number): number {
     return this.e.slot_colour(slot) >>> 0;
   }
-  noise(size: number): Uint8Array {
-    const at = this.e.noise(size); // first the call: memory that grows takes its views away
+  // The relief of tissue, or the lobules of cut tissue.
+  pattern(size: number, isInside: boolean): Uint8Array {
+    // First the call: memory that grows takes its views away.
+    const at = isInside ? this.e.lobules(size) : this.e.noise(size);
     return new Uint8Array(this.e.memory.buffer, at, size ** 3 * 4).slice();
   }
 

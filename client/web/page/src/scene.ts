@@ -1,6 +1,7 @@
 // The picture: geometry of the module, drawn with the native client's shaders.
 
 import {
+  BackSide,
   BufferAttribute,
   BufferGeometry,
   Data3DTexture,
@@ -24,7 +25,12 @@ import {
   type PerspectiveCamera,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { lightingSource, organFragmentSource, organVertexSource } from './gen/shaders';
+import {
+  backFragmentSource,
+  lightingSource,
+  organFragmentSource,
+  organVertexSource,
+} from './gen/shaders';
 import { Field } from './field';
 import { FineLayer } from './fine';
 import { Instruments, kShadows, type Guide } from './instruments';
@@ -36,7 +42,8 @@ export interface SurfacePlace {
   corners: Vec3;
   shares: Vec3;
 }
-const kNoise = 64;
+const kPattern = 64;
+const kScopeLamp = 0.07;
 const kHazePerMiddle = 0.55,
   kScopeHaze: [number, number] = [0.05, 4]; // the native picture's
 const kPitch = 0.42; // views begin at the front, a side, the back, and above
@@ -66,10 +73,13 @@ export class Picture {
   private readonly panes = kStarts.map(([yaw, pitch]) => new Pane(yaw, pitch));
   private count: ViewCount = 1;
   private active = 0; // the view that mouse and keys move
-  private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
+  // Its outside, and what a blade has laid open.
+  private readonly organ: Mesh<BufferGeometry, [RawShaderMaterial, RawShaderMaterial]>;
+  private readonly backs: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly fine: FineLayer;
   private readonly field: Field;
   private readonly uniforms: Record<string, IUniform>;
+  private readonly looks: Side[]; // of the outside and the inside
   private readonly instruments: Instruments;
   private version = -1;
   private lastMs = 0;
@@ -95,7 +105,8 @@ export class Picture {
     this.renderer.setClearColor(0, 0);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
-    this.controls.minDistance = 0.04;
+    this.controls.zoomToCursor = true;
+    this.controls.minDistance = 0.01;
     this.controls.maxDistance = 2.5;
     this.controls.target = this.main.target;
     this.controls.addEventListener('start', () => {
@@ -105,32 +116,36 @@ export class Picture {
     // Before the controls: they move the view that was touched.
     for (const kind of ['pointerdown', 'wheel'] as const)
       canvas.addEventListener(kind, this.touch, true);
-    const noise = new Data3DTexture(replica.noise(kNoise), kNoise, kNoise, kNoise);
-    noise.wrapS = noise.wrapT = noise.wrapR = RepeatWrapping;
-    noise.magFilter = noise.minFilter = LinearFilter;
-    noise.needsUpdate = true;
     const four = (): Vector4[] => Array.from({ length: kShadows }, () => new Vector4());
     this.uniforms = {
       clip_from_world: { value: new Matrix4() },
       eye: { value: new Vector3() },
       key_direction: { value: new Vector3(0, 1, 0) },
       fill_direction: { value: new Vector3(0, 1, 0) },
+      lamp: { value: 0 },
       haze: { value: new Vector2() },
-      noise: { value: noise },
       shadow_count: { value: 0 },
       shadow_tip: { value: four() },
       shadow_shaft: { value: four() },
     };
-    this.organ = new Mesh(
-      new BufferGeometry(),
-      new RawShaderMaterial({
-        glslVersion: GLSL3,
-        vertexShader: organVertexSource,
-        uniforms: this.uniforms,
-      }),
-    );
-    this.organ.frustumCulled = false;
-    this.fine = new FineLayer(this.uniforms);
+    const side = (isInside: boolean): Side => ({
+      ...this.uniforms,
+      noise: { value: patternOf(replica, isInside) },
+      part_dark: { value: new Float32Array(12) },
+      part_light: { value: new Float32Array(12) },
+      lines: { value: new Float32Array(4) },
+      figures: { value: new Float32Array(4) },
+    });
+    const outside = side(false),
+      inside = side(true);
+    this.looks = [outside, inside];
+    const material = (uniforms: Record<string, IUniform>): RawShaderMaterial =>
+      new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: organVertexSource, uniforms });
+    this.organ = new Mesh(new BufferGeometry(), [material(outside), material(inside)]);
+    this.backs = new Mesh(this.organ.geometry, material(outside));
+    this.backs.material.side = BackSide;
+    this.organ.frustumCulled = this.backs.frustumCulled = false;
+    this.fine = new FineLayer(outside);
     this.field = new Field(this.uniforms);
     this.instruments = new Instruments(
       this.scene,
@@ -141,7 +156,13 @@ export class Picture {
       this.main,
       at => this.onCanvas(at),
     );
-    this.scene.add(this.organ, this.fine.mesh, this.field.backdrop, this.field.scopeEdge);
+    this.scene.add(
+      this.organ,
+      this.backs,
+      this.fine.mesh,
+      this.field.backdrop,
+      this.field.scopeEdge,
+    );
     this.setQuality(this.quality);
   }
 
@@ -282,6 +303,7 @@ export class Picture {
       );
     }
     this.controls.update();
+    for (const pane of shown) pane.keepClear(this.replica);
     this.instruments.place(tools, seconds, this.showsArrows);
     this.fine.load(this.replica);
     // The fine surface takes the place of the outside.
@@ -402,9 +424,15 @@ export class Picture {
     const head =
       'precision highp float;\nprecision highp sampler3D;\n' +
       (quality === 0 ? '#define FINE 1\n' : '');
-    this.organ.material.fragmentShader = head + lightingSource + organFragmentSource;
-    this.organ.material.needsUpdate = true;
-    this.fine.setHead(head);
+    const near = quality < 2 ? '#define NEAR 1\n' : '';
+    this.organ.material.forEach((material, isInside) => {
+      material.fragmentShader =
+        head + near + (isInside ? '#define INSIDE 1\n' : '') + lightingSource + organFragmentSource;
+      material.needsUpdate = true;
+    });
+    this.backs.material.fragmentShader = head + lightingSource + backFragmentSource;
+    this.backs.material.needsUpdate = true;
+    this.fine.setHead(head + near);
     this.instruments.head = head;
     this.resize(this.width, this.height);
   }
@@ -448,7 +476,19 @@ export class Picture {
     g.setAttribute('lip', dynamic(new BufferAttribute(new Int8Array(n * 4), 4, true)));
     g.setAttribute('rest', new BufferAttribute(r.rest().slice(), 4));
     g.setAttribute('overlay', dynamic(new BufferAttribute(new Uint8Array(n * 4), 4, true)));
-    g.setIndex(new BufferAttribute(r.triangles().slice(), 1));
+    const triangles = r.triangles().slice(),
+      outside = r.outerTriangles * 3;
+    g.setIndex(new BufferAttribute(triangles, 1));
+    g.clearGroups();
+    g.addGroup(0, outside, 0);
+    g.addGroup(outside, triangles.length - outside, 1);
+    this.looks.forEach((side, isInside) => {
+      const look = r.look(isInside === 1);
+      side.part_dark.value = look.dark;
+      side.part_light.value = look.light;
+      side.lines.value = look.lines;
+      side.figures.value = look.figures;
+    });
     this.field.measure(...this.box());
     this.version = r.geometryVersion;
   }
@@ -482,6 +522,7 @@ export class Picture {
     (u['key_direction']!.value as Vector3).copy(
       pane.isEndoscope ? direction(0.05, 0.12, 1) : direction(0.42, 0.88, 0.55),
     );
+    u['lamp']!.value = pane.isEndoscope ? kScopeLamp : 0;
     (u['fill_direction']!.value as Vector3).copy(direction(-0.9, 0.15, 0.35));
     const middle = camera.position.distanceTo(pane.target);
     (u['haze']!.value as Vector2).set(
@@ -492,6 +533,27 @@ export class Picture {
       camera.matrixWorldInverse,
     );
   }
+}
+
+// What the organ's shader takes beside light and view, for one side of the organ.
+interface Side extends Record<string, IUniform> {
+  part_dark: IUniform<Float32Array>;
+  part_light: IUniform<Float32Array>;
+  lines: IUniform<Float32Array>;
+  figures: IUniform<Float32Array>;
+}
+
+function patternOf(replica: Replica, isInside: boolean): Data3DTexture {
+  const texture = new Data3DTexture(
+    replica.pattern(kPattern, isInside),
+    kPattern,
+    kPattern,
+    kPattern,
+  );
+  texture.wrapS = texture.wrapT = texture.wrapR = RepeatWrapping;
+  texture.magFilter = texture.minFilter = LinearFilter;
+  texture.needsUpdate = true;
+  return texture;
 }
 
 function dynamic(attribute: BufferAttribute): BufferAttribute {
