@@ -84,10 +84,12 @@ endif()
 if(TROCAR_PYTHON)
   target_link_options(trocar_module PRIVATE -Wl,-z,relro,-z,now)
   set(python_files "${PROJECT_SOURCE_DIR}/deploy/python")
+  set(modules "lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages")
+  set(written_in_python "${PROJECT_SOURCE_DIR}/server/python/trocar")
   install(TARGETS trocar_module LIBRARY COMPONENT python PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ
-    DESTINATION "lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages")
-  install(FILES "${python_files}/trocar.pyi" COMPONENT python
-    DESTINATION "lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages")
+    DESTINATION "${modules}/trocar")
+  install(DIRECTORY "${written_in_python}" DESTINATION "${modules}" COMPONENT python
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
   # They find the scenarios in the folder beside theirs.
   foreach(component IN ITEMS python of_python)
     set(all)

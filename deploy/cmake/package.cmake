@@ -40,9 +40,10 @@ install(FILES "${files}/lesson.toml" "${files}/hall.toml" DESTINATION /etc/troca
 install(FILES "${files}/web.toml" DESTINATION /etc/trocar COMPONENT of_web EXCLUDE_FROM_ALL)
 install(FILES "${files}/trocar-server.conf" DESTINATION lib/sysusers.d COMPONENT of_server EXCLUDE_FROM_ALL)
 if(TROCAR_PYTHON)
-  install(TARGETS trocar_module LIBRARY DESTINATION lib/python3/dist-packages COMPONENT of_python EXCLUDE_FROM_ALL
+  install(TARGETS trocar_module LIBRARY DESTINATION lib/python3/dist-packages/trocar COMPONENT of_python EXCLUDE_FROM_ALL
     PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
-  install(FILES "${python_files}/trocar.pyi" DESTINATION lib/python3/dist-packages COMPONENT of_python EXCLUDE_FROM_ALL)
+  install(DIRECTORY "${written_in_python}" DESTINATION lib/python3/dist-packages COMPONENT of_python EXCLUDE_FROM_ALL
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
 endif()
 install(FILES "${files}/trocar-web.conf" DESTINATION lib/sysusers.d COMPONENT of_web EXCLUDE_FROM_ALL)
 
@@ -105,7 +106,8 @@ ${processor}")
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION "surgery simulator: module for Python
 Trocar lets several people, each at a machine of their own, work on one
 organ that one server owns. This package runs its engine inside Python 3:
-organs, scenarios, sessions and recordings as arrays of numpy.
+organs, scenarios, sessions and recordings as arrays of numpy, tasks
+for what learns, and scenes for other programs.
 ${processor}")
 set(CPACK_DEBIAN_DOC_DESCRIPTION "surgery simulator: the book
 Trocar lets several people, each at a machine of their own, work on one
@@ -133,7 +135,7 @@ if(TROCAR_PYTHON)
     "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
 endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "trocar-tools")
-set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-matplotlib, python3-pandas, trocar-doc")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-matplotlib, python3-pandas, python3-h5py, trocar-doc")
 set(CPACK_DEBIAN_DOC_PACKAGE_SECTION doc)
 set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DOC_PACKAGE_CONTROL_EXTRA)

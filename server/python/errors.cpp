@@ -36,7 +36,7 @@ void bind_errors(py::module_& module) {
 }
 
 void raise(const Error& error) {
-  const auto type = py::module_::import("trocar").attr("Error");
+  const auto type = py::module_::import("trocar._engine").attr("Error");
   // Messages may quote bytes of a file that are no UTF-8.
   const auto text = py::reinterpret_steal<py::object>(PyUnicode_DecodeUTF8(
       error.message.data(), static_cast<Py_ssize_t>(error.message.size()), "replace"));

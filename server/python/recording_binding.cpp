@@ -162,7 +162,7 @@ py::list events(const Recording& recording) {
 py::dict tools(const Recording& recording) {
   std::vector<std::uint64_t> tick;
   std::vector<std::uint32_t> tool, contacts;
-  std::vector<float> x, y, z, fx, fy, fz;
+  std::vector<float> x, y, z, qx, qy, qz, qw, fx, fy, fz;
   py::list verbs;
   check(
       recording.journal().read_frame_states(0, kEnd, [&](Tick at, const proto::FrameState& state) {
@@ -173,6 +173,10 @@ py::dict tools(const Recording& recording) {
           x.push_back(one.position_m().x());
           y.push_back(one.position_m().y());
           z.push_back(one.position_m().z());
+          qx.push_back(one.orientation().x());
+          qy.push_back(one.orientation().y());
+          qz.push_back(one.orientation().z());
+          qw.push_back(one.orientation().w());
           fx.push_back(one.force_n().x());
           fy.push_back(one.force_n().y());
           fz.push_back(one.force_n().z());
@@ -187,6 +191,10 @@ py::dict tools(const Recording& recording) {
   out["x_m"] = take_array(std::move(x), 0);
   out["y_m"] = take_array(std::move(y), 0);
   out["z_m"] = take_array(std::move(z), 0);
+  out["qx"] = take_array(std::move(qx), 0);
+  out["qy"] = take_array(std::move(qy), 0);
+  out["qz"] = take_array(std::move(qz), 0);
+  out["qw"] = take_array(std::move(qw), 0);
   out["fx_n"] = take_array(std::move(fx), 0);
   out["fy_n"] = take_array(std::move(fy), 0);
   out["fz_n"] = take_array(std::move(fz), 0);
@@ -202,6 +210,15 @@ py::array tick_hashes(const Recording& recording) {
                                                 return true;
                                               }));
   return take_array(std::move(hashes), 0);
+}
+
+py::array recorded_ticks(const Recording& recording) {
+  std::vector<std::uint64_t> ticks;
+  check(recording.journal().read_tick_records(0, kEnd, [&ticks](Tick tick, const auto&) {
+    ticks.push_back(tick);
+    return true;
+  }));
+  return take_array(std::move(ticks), 0);
 }
 
 }  // namespace
@@ -229,8 +246,10 @@ void bind_recording(py::module_& module) {
            "(slot: participant x 2 + number), what and verb.")
       .def("tools", &tools,
            "A row for each tool of each frame, as columns for pandas.DataFrame: tick, tool (slot), "
-           "verb, tip (m), force of the tissue on it (N), nodes in contact.")
+           "verb, tip (m), orientation (quaternion), force of the tissue on it (N), nodes in "
+           "contact.")
       .def("tick_hashes", &tick_hashes, "State hash after each recorded tick; uint64 (ticks).")
+      .def("ticks", &recorded_ticks, "The ticks that tick_hashes() is of; uint64 (ticks).")
       .def(
           "organ",
           [](const Recording& recording) {

@@ -44,8 +44,10 @@ py::array shared_view(const std::shared_ptr<std::vector<float>>& numbers) {
 
 }  // namespace
 
-Session::Session(const organ::Organ& organ, unsigned threads)
-    : simulation_(organ, threads), decisions_(simulation_.with_sweeps_for_organ({})) {
+Session::Session(const organ::Organ& organ, unsigned threads, std::optional<lesson::Lesson> lesson)
+    : simulation_(organ, threads, lesson ? rules_of(*lesson) : step::SceneRules{}),
+      decisions_(simulation_.with_sweeps_for_organ({})) {
+  if (lesson) course_.emplace(*std::move(lesson));
   tick_hash_ = simulation_.state_hash();
   refresh();
 }
@@ -121,7 +123,8 @@ void Session::tick_once() {
   const py::gil_scoped_release others_run;
   gather_inputs();
   tick_hash_ = simulation_.tick(inputs_, decisions_).state_hash;
-  simulation_.pop_frame();
+  const auto frame = simulation_.pop_frame();
+  if (frame && course_) course_->observe(frame, simulation_.layout());
 }
 
 void Session::step(std::uint64_t ticks, const py::object& callback) {
@@ -172,6 +175,27 @@ Vec3f Session::tip(ToolSlot tool) const {
   return simulation_.state().tools[tool].pose.position;
 }
 
+Pose Session::pose(ToolSlot tool) const {
+  check_free();
+  return simulation_.state().tools[tool].pose;
+}
+
+bool Session::is_at_work(ToolSlot tool) const {
+  check_free();
+  return simulation_.state().claims.is_in_effect(tool);
+}
+
+SessionCourse& Session::course() {
+  check_free();
+  if (!course_) raise({ErrorCode::Usage, "session: has no lesson, make it with lesson="});
+  return *course_;
+}
+
+const step::Simulation& Session::simulation() const {
+  check_free();
+  return simulation_;
+}
+
 std::uint64_t Session::state_hash() const {
   check_free();
   return simulation_.state_hash();
@@ -195,6 +219,7 @@ void Session::restore(BytesView state) {
     raise({ErrorCode::Refused, "session: is in step(), restore it when that has returned"});
   check(simulation_.restore_snapshot(state));
   next_.clear();
+  if (course_) course_.emplace(lesson::Lesson(course_->lesson()));
   tick_hash_ = simulation_.state_hash();
   refresh();
 }

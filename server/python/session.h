@@ -16,13 +16,15 @@
 
 #include "common/tool/tool.h"
 #include "server/organs/organ/organ.h"
+#include "server/python/session_course.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::python {
 
 class Session {
  public:
-  Session(const organ::Organ& organ, unsigned threads);
+  // lesson: none, or that whose course the session takes.
+  Session(const organ::Organ& organ, unsigned threads, std::optional<lesson::Lesson> lesson);
 
   // Simulates n ticks, 1 ms each; callback(tick) after each.
   void step(std::uint64_t ticks, const pybind11::object& callback);
@@ -32,12 +34,20 @@ class Session {
   void leave(ParticipantSlot hand);
 
   Tick tick() const;
-  Vec3f force(ToolSlot tool) const;  // of the tissue on the tool, N, world frame
-  Vec3f tip(ToolSlot tool) const;    // m, world frame
+  Vec3f force(ToolSlot tool) const;      // of the tissue on the tool, N, world frame
+  Vec3f tip(ToolSlot tool) const;        // m, world frame
+  Pose pose(ToolSlot tool) const;        // world from tool
+  bool is_at_work(ToolSlot tool) const;  // its push, grasp or cut is in effect
   std::uint64_t state_hash() const;
   std::uint64_t tick_hash() const;  // after the last tick, as recordings have it
   Bytes save() const;
+  // A lesson begins anew.
   void restore(BytesView state);
+
+  // Error: there is none.
+  SessionCourse& course();
+  // Shows what is simulated, between two ticks.
+  const step::Simulation& simulation() const;
 
   // Float32 (nodes x 3); shown again after each step, and another array once a cut made nodes.
   pybind11::array positions() const;
@@ -57,6 +67,7 @@ class Session {
   const step::TickDecisions decisions_;
   hands::TickInputs next_;    // of the next tick, as put by Python
   hands::TickInputs inputs_;  // scratch
+  std::optional<SessionCourse> course_;
   std::uint64_t tick_hash_ = 0;
   std::shared_ptr<Floats> positions_, velocities_;
   bool is_ticking_ = false, is_stepping_ = false;

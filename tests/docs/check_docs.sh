@@ -158,6 +158,7 @@ check_options() {
     [ -f "$program" ] && [ -x "$program" ] || continue
     help_of "./$program" | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
+  grep -hoE '"--[a-z][a-z0-9-]*"' server/python/trocar/*.py deploy/python/*.py | tr -d '"' >>"$known"
   # Of cmake, systemctl, podman and bench_crowd.
   printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"
   for page in "${pages[@]}"; do

@@ -100,7 +100,7 @@ check "each program has a page for man" inside sh -c \
 # Programs are stripped; what was taken away lies where a debugger looks, under the program's id.
 lines_for_debuggers() {
   local file id faults=0
-  for file in "$root"/usr/bin/trocar-* "$root"/usr/lib/python3/dist-packages/trocar.*.so; do
+  for file in "$root"/usr/bin/trocar-* "$root"/usr/lib/python3/dist-packages/trocar/_engine.*.so; do
     [ -e "$file" ] || continue
     id=$(readelf -n "$file" | sed -n 's/.*Build ID: //p')
     if readelf -SW "$file" | grep -q '[.]debug_line' ||
@@ -148,7 +148,7 @@ print(session.force(), "N", session.state_hash())
 PYTHON
   as ada '/usr/bin/python3 press.py && /usr/bin/python3 /usr/share/trocar/python/fit_material.py'
 }
-if [ -e "$root"/usr/lib/python3/dist-packages/trocar.pyi ]; then check "a press in Python" press; fi
+if [ -e "$root"/usr/lib/python3/dist-packages/trocar/__init__.pyi ]; then check "a press in Python" press; fi
 
 page() {
   local port answer
@@ -203,7 +203,7 @@ all=$(cd "$packages" && printf '%s\n' *.deb | sed 's/_.*//' | tr '\n' ' ')
 remove_all() { inside sh -c "apt-get remove -y $all"; }
 check "removal" remove_all
 check "no program is left" inside sh -c \
-  '[ -z "$(ls -d /usr/bin/trocar-* /usr/share/trocar /usr/lib/systemd/system/trocar* /usr/lib/python3/dist-packages/trocar*)" ]'
+  '[ -z "$(ls -d /usr/bin/trocar-* /usr/share/trocar /usr/lib/systemd/system/trocar* /usr/lib/python3/dist-packages/trocar)" ]'
 check "configuration, codes and recordings are" test -e "$root/etc/trocar/lesson.toml" -a \
   -e "$root/var/lib/trocar/state/codes-7699.json" -a "$(recordings)" = 1
 check "the same packages again" install_all

@@ -31,7 +31,7 @@ for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-hall.se
 done
 [ ! -e "$work/usr/etc" ] && [ ! -e "$work/etc" ] || fault "files of /etc are there, which only packages have"
 if [ -e "$build/python" ]; then
-  module=$(find "$work/usr/lib" -path '*/python3.*/dist-packages/trocar.*.so' -printf '%h\n')
+  module=$(find "$work/usr/lib" -path '*/python3.*/dist-packages/trocar/_engine.*.so' -printf '%h/..\n')
   PYTHONPATH=$module /usr/bin/python3 "$work/usr/share/trocar/python/fit_material.py" >"$work/log" 2>&1 ||
     fault "the module for Python or its example does not start: $(cat "$work/log")"
 fi

@@ -65,6 +65,21 @@ class ExamplesTest(unittest.TestCase):
                             "--out", folder], check=True, stdout=subprocess.DEVNULL)
             self.assertRegex(run("read_recording", recording), r"(?s)N, frame by frame.* mean .* max\ntool *\n0 +\d")
 
+    def test_learn(self):
+        # A few policies for short episodes: they learn little, and the same in every run.
+        for task, iterations, population, gain in (("reach", 2, 12, 1), ("press", 1, 8, 10)):
+            said = run("learn", task, "--iterations", iterations, "--population", population, "--episodes", 1,
+                       "--tests", 2, "--seconds", 0.6)
+            before, after = (float(re.search(f"{word}: return (\\S+)", said).group(1)) for word in ("before", "after"))
+            self.assertGreater(after, before + gain)
+
+    def test_gym_speed(self):
+        rows = run("gym_speed", "--steps", 5, "--threads", 2).splitlines()
+        self.assertEqual(len(rows), 2)
+        hashes = [re.fullmatch(r"\d+ nodes, \d threads?: \d+ steps/s, .* times real time a core, .* in touch, "
+                               r"state hash (\w{16})", row).group(1) for row in rows]
+        self.assertEqual(hashes[0], hashes[1])
+
     def test_plots(self):
         needs("matplotlib")
         with tempfile.TemporaryDirectory() as folder:

@@ -158,7 +158,7 @@ class SessionTest(unittest.TestCase):
 
 class StubsTest(unittest.TestCase):
     def test_stubs_are_those_of_the_module(self):
-        path = pathlib.Path(os.environ["TROCAR_ROOT"]) / "deploy/python/trocar.pyi"
+        path = pathlib.Path(os.environ["TROCAR_ROOT"]) / "server/python/trocar/__init__.pyi"
         self.assertEqual(path.read_text(), stubs.stubs())
 
 

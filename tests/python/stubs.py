@@ -1,4 +1,4 @@
-"""Writes the stubs of the module trocar as it is: python3 stubs.py > deploy/python/trocar.pyi"""
+"""Writes the stubs of the module trocar as it is: python3 stubs.py > server/python/trocar/__init__.pyi"""
 
 import inspect
 import re
@@ -59,6 +59,9 @@ def stubs():
     for name, kind in sorted(vars(trocar).items()):
         if inspect.isclass(kind) and name != "Error":
             lines += [f"\nclass {name}:", f"    {quoted(kind.__doc__, 4)}\n", *members(kind)]
+        elif inspect.isbuiltin(kind):
+            first, doc = signature_and_doc(kind.__doc__)
+            lines += [f"\ndef {first}:", f"    {quoted(doc, 4)}\n"]
     return "\n".join(lines)
 
 

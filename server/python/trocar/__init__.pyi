@@ -1,4 +1,4 @@
-"""Soft tissue that hands push, grasp and cut: organs, scenarios, sessions and recordings.
+"""Soft tissue that hands push, grasp and cut: organs, lessons, scenarios, sessions and recordings.
 
 Lengths are in m, forces in N, masses in kg; a tick is 1 ms. Arrays are read-only."""
 
@@ -40,6 +40,38 @@ class FrameIterator:
 
     def __next__(self) -> Frame:
         """The next frame."""
+
+
+class Lesson:
+    """A lesson: an organ with structures in it, and stages with a goal each.
+
+    Lesson("find-the-lump") is one that the programs bring, see lessons(); Lesson("file.toml") a file. Raises Error with file, line and key."""
+
+    def __init__(self, spec: str) -> None:
+        ...
+
+    @property
+    def bleeds(self) -> bool:
+        """Whether what is cut bleeds."""
+
+    def organ(self) -> Organ:
+        """Its organ with the structures in it, for Session(organ, lesson=lesson)."""
+
+    @property
+    def organ_name(self) -> str:
+        """A built-in organ's name, or a file's path."""
+
+    @property
+    def stages(self) -> list:
+        """Dicts of name, text, goal (find, follow, lift, hold, incise, remove or carry), line (points, m), limit_s, force_limit_n (0: none) and hands."""
+
+    @property
+    def text(self) -> str:
+        """What people read."""
+
+    @property
+    def title(self) -> str:
+        """What people read."""
 
 
 class Organ:
@@ -160,8 +192,11 @@ class Recording:
     def tick_hashes(self) -> numpy.ndarray:
         """State hash after each recorded tick; uint64 (ticks)."""
 
+    def ticks(self) -> numpy.ndarray:
+        """The ticks that tick_hashes() is of; uint64 (ticks)."""
+
     def tools(self) -> dict:
-        """A row for each tool of each frame, as columns for pandas.DataFrame: tick, tool (slot), verb, tip (m), force of the tissue on it (N), nodes in contact."""
+        """A row for each tool of each frame, as columns for pandas.DataFrame: tick, tool (slot), verb, tip (m), orientation (quaternion), force of the tissue on it (N), nodes in contact."""
 
 
 class Scenario:
@@ -233,16 +268,37 @@ class ScenarioResult:
 class Session:
     """An organ and hands, without network: a tick is 1 ms of simulated time.
 
-    Results do not depend on `threads`, 1 to 64. While one thread is in step() others may not use the session: that raises Error."""
+    Results do not depend on `threads`, 1 to 64. While one thread is in step() others may not use the session: that raises Error. With a `lesson`, whose organ() it is, the session takes its course, see course()."""
 
-    def __init__(self, organ: Organ, *, threads: int = 1) -> None:
+    def __init__(self, organ: Organ, *, threads: int = 1, lesson: Optional[Lesson] = None) -> None:
         ...
+
+    def answer(self, hand: int = 0, *, tool: int = 0) -> str:
+        """Says "it is here", with the tip of a tool as the newest frame has it; returns right, wrong, not asked or no tissue."""
+
+    def counts(self) -> dict:
+        """Dict of nodes, tets, triangles, wound_triangles, pieces (that cuts have set free) and edits (cuts and tears)."""
+
+    def course(self) -> dict:
+        """How far the lesson is: dict of stage, stages, is_over, progress (of the goal, 0 to 1), seconds, is_too_strong, points (0 to 100), target (m, or None) and results, a dict of is_reached, points and measures for each stage that is over. Raises Error without one."""
 
     def force(self, hand: int = 0, *, tool: int = 0) -> numpy.ndarray:
         """Force of the tissue on a tool after the last tick, N, world frame; float32 (3)."""
 
+    def incision(self, line: sequence, *, depth: float, tolerance: float) -> dict:
+        """What is cut along a line of 2 to 32 points at rest, m, to a depth towards the organ's centre, m, as lessons measure it: dict of covered (0 to 1), error (mean distance of the wound from the line, m) and stray (wound farther away than the tolerance, m^2)."""
+
+    def is_at_work(self, hand: int = 0, *, tool: int = 0) -> bool:
+        """Whether its push, grasp or cut is in effect."""
+
     def leave(self, hand: int) -> None:
         """The hand leaves in the next tick; what it held is set free."""
+
+    def next_stage(self) -> None:
+        """Goes on to the next stage; the goal of this one counts as not reached."""
+
+    def pose(self, hand: int = 0, *, tool: int = 0) -> numpy.ndarray:
+        """Where a tool is: x, y, z of its tip, m, and its quaternion x, y, z, w, world frame; float32 (7). Its shaft is along z of its own frame."""
 
     @property
     def positions(self) -> numpy.ndarray:
@@ -253,8 +309,12 @@ class Session:
 
         `hand` 0 to 15 joins by it, `tool` is 0 or 1, `verb` none, push, grasp or cut. `shaft` is the direction from the tip along the shaft, up without it; `orientation` a quaternion x, y, z, w in its place."""
 
+    @property
+    def rest_positions(self) -> numpy.ndarray:
+        """Rest positions of all nodes, m, world frame; float64 (nodes x 3)."""
+
     def restore(self, state: bytes) -> None:
-        """Goes on from a state that save() gave. Raises Error, and keeps its own state, where the bytes are not one of this organ."""
+        """Goes on from a state that save() gave; a lesson begins anew. Raises Error, and keeps its own state, where the bytes are not one of this organ."""
 
     def save(self) -> bytes:
         """The whole state, to restore() it in a session of an equal organ."""
@@ -269,6 +329,10 @@ class Session:
         """Gives a hand another instrument, from the next tick on; lengths in m, grip in N."""
 
     @property
+    def tets(self) -> numpy.ndarray:
+        """Node numbers of each tet as it is now; uint32 (tets x 4)."""
+
+    @property
     def tick(self) -> int:
         """Ticks done."""
 
@@ -280,5 +344,17 @@ class Session:
         """Where a tool's tip is, m, world frame; float32 (3). It is on its way to what was put."""
 
     @property
+    def triangles(self) -> numpy.ndarray:
+        """Node numbers of each boundary triangle as it is now, outward; uint32 (triangles x 3)."""
+
+    @property
     def velocities(self) -> numpy.ndarray:
         """Node velocities, m/s; float32 (nodes x 3), as positions."""
+
+    @property
+    def wounds(self) -> numpy.ndarray:
+        """Whether a blade made each of `triangles`; bool (triangles)."""
+
+
+def lessons() -> List[str]:
+    """Names of the lessons that the programs bring."""
