@@ -136,6 +136,26 @@ class LessonTest(unittest.TestCase):
         # Ten for each of two stages' progress but for their last steps, and a tenth of their points.
         self.assertAlmostEqual(sum(rewards), 20 + 2 * info["points"] / 10, delta=0.5)
 
+    def test_a_ring_is_carried_to_its_peg(self):
+        env = gym.make("trocar/MoveTheRings-v0")
+        state, _ = env.reset(seed=0)
+        total = 0.0
+        # Where tool 0 goes, mm, whether its jaws are closed, and how many steps it waits there.
+        for place, use, wait in (((-33, 40, 0), -1, 0), ((-33, 4.5, 0), -1, 10), ((-33, 4.5, 0), 1, 40),
+                                 ((-33, 40, 0), 1, 0), ((15, 40, 0), 1, 0), ((15, 4.5, 0), 1, 10),
+                                 ((15, 4.5, 0), -1, 40), ((15, 40, 0), -1, 50)):
+            while wait >= 0:
+                away = np.array(place) / 1000 - state["pose"][0, :3]
+                action = np.concatenate([np.clip(0.7 * away / 0.001, -0.7, 0.7), [use, 0, 0, 0, -1, -1]])
+                state, reward, _, _, info = env.step(action)
+                total += reward
+                wait -= np.linalg.norm(away) < 0.001
+        self.assertEqual(info["stage"], 1)
+        result, = env.session.course()["results"]
+        self.assertTrue(result["is_reached"])
+        self.assertEqual(result["measures"]["drops"], 0)
+        self.assertAlmostEqual(total, 10 + result["points"] / 10, delta=0.3)
+
     def test_an_answer_is_told(self):
         env = gym.make("trocar/FindTheLump-v0")
         env.reset(seed=1)
