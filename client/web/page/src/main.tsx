@@ -9,6 +9,7 @@ import { nameFault, readLink, rememberName, type Link } from './link';
 import { Live } from './live';
 import { ofFile, overHttp, Recording } from './recording';
 import { Replica } from './replica';
+import { ThemeButton } from './theme';
 
 type Where =
   | { is: 'start'; why: string }
@@ -43,6 +44,9 @@ function Start(props: {
   };
   return (
     <main>
+      <div class="corner">
+        <ThemeButton />
+      </div>
       <form class="sheet" onSubmit={submit}>
         <h1>Watch a session</h1>
         {props.why && (
