@@ -47,6 +47,11 @@ cd "$work"
 for file in "$root/deploy/install/hall.toml" "$work/usr/share/doc/trocar-server/examples/trocar-hall.toml"; do
   XDG_STATE_HOME=$work "$work/usr/bin/trocar-hall" --config "$file" --check-config >"$work/log" 2>&1 || fault "$(cat "$work/log")"
 done
+# The hall of the package offers each lesson.
+for file in "$root"/common/lesson/lessons/*.toml; do
+  name=$(basename "$file" .toml)
+  grep -qx "lesson = \"$name\"" "$root/deploy/install/hall.toml" || fault "deploy/install/hall.toml: does not offer $name"
+done
 if [ -e "$work/usr/share/trocar/web/index.html" ]; then
   "$work/usr/bin/trocar-web" --config "$root/deploy/install/web.toml" --check-config >"$work/log" 2>&1 ||
     fault "$(cat "$work/log")"

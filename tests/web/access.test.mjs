@@ -47,6 +47,38 @@ for (const scheme of ['dark', 'light'])
       await debrief.context().close();
     });
 
+test('keys act wherever the focus is, H lists them, Esc leaves, and the colours are remembered', async () => {
+  const page = await open(link(world.server.codes.instructor, 'instructor', 'Kay'));
+  await live(page);
+  const button = name => page.getByRole('button', { name, exact: true }), pressed = name => button(name).getAttribute('aria-pressed');
+  await button('Leave').focus();
+  await page.keyboard.press('l');
+  await until('holds are hidden', async () => await pressed('Holds') === 'false');
+  await page.keyboard.press('h');
+  await page.getByRole('dialog', { name: 'Keys' }).getByText('who holds what').waitFor({ timeout: kPatience });
+  await check(page, 'keys');
+  await page.keyboard.press('Escape');
+  await page.getByRole('dialog', { name: 'Keys' }).waitFor({ state: 'detached', timeout: kPatience });
+  // What is typed is no key.
+  await page.getByLabel('A line for everybody').fill('');
+  await page.keyboard.type('lh');
+  assert.equal(await pressed('Holds'), 'false');
+  assert.equal(await page.getByRole('dialog').count(), 0);
+  await button('Draw').click();
+  await until('it draws', async () => await pressed('Draw') === 'true');
+  await page.keyboard.press('Escape');
+  await until('it draws no more', async () => await pressed('Draw') === 'false');
+  const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
+  assert.equal(await theme(), 'dark');
+  await button('Light').click();
+  assert.equal(await theme(), 'light');
+  await close(page);
+  const again = await page.context().newPage();
+  await again.goto(base());
+  assert.equal(await again.evaluate(() => document.documentElement.dataset.theme), 'light');
+  await again.context().close();
+});
+
 test('two and four views of one scene, by keys alone', async () => {
   const page = await open(link(world.server.codes.observer, 'observer', 'Olga'));
   await live(page);

@@ -25,7 +25,7 @@ test('a recording verifies, and a changed one is told by its reason', async () =
   fs.writeFileSync(`${folder}/broken.mcap`, broken);
   fs.utimesSync(`${folder}/broken.mcap`, longAgo, longAgo);
   let page = await open('lesson.mcap');
-  await button(page, 'Check it').click();
+  await button(page, 'Verify recording').click();
   await page.locator('.check').getByText(/It is being checked, for \d+ s so far/).waitFor({ timeout: kPatience });
   // The check has the lowest priority: a browser that draws in software would take its time.
   await page.close();
@@ -275,7 +275,7 @@ test('another recording stands beside, on one clock or by an event of each', asy
   const here = await choose('Where the first has', 'retract has a grasp'), there = await choose('this one has', 'incise stopped cutting');
   await page.evaluate(tick => window.trocar.player.seek(tick), here + 100);
   await until('events come together', async () => { const [first, second] = await ticks(); return first === here + 100 && Math.abs(second - there - 100) <= 16; });
-  await button(page, 'Take it away').click();
+  await page.locator('.beside').getByRole('button', { name: 'Close' }).click();
   await page.locator('.half + .half').waitFor({ state: 'detached', timeout: kPatience });
   assert.deepEqual(page.faults, []);
   await page.close();

@@ -82,7 +82,7 @@ test('a tool that is frozen stays, and goes back when it is released', kTest, as
   await picture(ivy, 'frozen');
   await manage('Sam', 'Release tools');
   await until('it moves again', async () => apart(await tip(olga), frozen) > 0.005);
-  await manage('Sam', 'Take claim away');
+  await manage('Sam', 'Make let go');
   await sees(olga, 'Ivy has taken away what Sam holds');
 });
 
@@ -144,10 +144,10 @@ test('time stands still for all, and goes slower', kTest, async () => {
   await press(ivy, 'Go on');
   await until('it goes on', async () => await tick(olga) > paused + 100);
   await ivy.getByLabel('Time', { exact: true }).selectOption('0.25');
-  await olga.getByText('time at 25 %').waitFor({ timeout: kPatience });
+  await olga.getByText('Time is slow, 25 %').waitFor({ timeout: kPatience });
   await picture(ivy, 'slow');
   await ivy.getByLabel('Time', { exact: true }).selectOption('1');
-  await olga.getByText('time at 25 %').waitFor({ state: 'detached', timeout: kPatience });
+  await olga.getByText('Time is slow, 25 %').waitFor({ state: 'detached', timeout: kPatience });
 });
 
 test('marks have names, and the organ returns to each', kTest, async () => {

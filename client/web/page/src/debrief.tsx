@@ -15,7 +15,7 @@ import {
   bookmarksText,
   type Bookmark,
 } from './debrief/marks';
-import { Controls, keyActs, Timeline, type Clock } from './debrief/transport';
+import { Controls, kClockKeys, keyActs, Timeline, type Clock } from './debrief/transport';
 import { Course, type Quantity } from './debrief/course';
 import { eventsTable, forcesTable, Still } from './debrief/export';
 import { useOverlays } from './debrief/measuring';
@@ -25,6 +25,7 @@ import { kMostShots, Report, type ReportContent, type Shot } from './debrief/rep
 import { Take } from './debrief/take';
 import { LessonStageSchema } from './gen/proto/wire_pb';
 import { LessonPanel } from './goals';
+import { useEscape, useKeys } from './keys';
 import { recordingLink, type Link, type Moment } from './link';
 import { Events, hex, People } from './panels';
 import { kSpeeds, Player } from './player';
@@ -32,6 +33,7 @@ import { EventLog, traffic, type Recording } from './recording';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
 import { guideOf, Stage } from './stage';
+import { ThemeButton } from './theme';
 
 export function RecordingList(props: { link: Link; onChoose(name: string): void }): JSX.Element {
   const [list, setList] = useState<{ name: string; bytes: number; changed: number }[] | null>(null),
@@ -51,6 +53,9 @@ export function RecordingList(props: { link: Link; onChoose(name: string): void 
   }, []);
   return (
     <main class="sheet">
+      <div class="corner">
+        <ThemeButton />
+      </div>
       <h1>Recordings</h1>
       {fault && (
         <p class="fault" role="alert">
@@ -123,7 +128,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
     (): ToolGuide => ({
       nameOf: tool =>
         (log.names.get(tool >> 1) ?? `hand ${(tool >> 1) + 1}`) +
-        ((tool & 1) === 1 ? ', second tool' : ''),
+        ((tool & 1) === 1 ? ', left hand' : ''),
       colourOf: tool => hex(replica.slotColour(tool >> 1)),
     }),
     [],
@@ -182,6 +187,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
     };
   }, []);
 
+  useEscape(copied !== '', () => setCopied(''));
   const seek = (tick: number): void => void player.seek(tick);
   const change = (to: Bookmark[]): void => {
     setMarks(to);
@@ -209,9 +215,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
       redraw(n => n + 1);
     },
   };
-  const onKey = (event: KeyboardEvent): void => {
-    if (keyActs(time, event)) event.preventDefault();
-  };
+  useKeys(key => keyActs(time, key));
   const share = async (more: Partial<Moment>): Promise<void> => {
     const link = recordingLink(props.link.recordingsKey, props.name, {
       seconds: player.tick / 1000,
@@ -259,7 +263,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
     speed: player.speed,
   });
   return (
-    <div class={`layout debrief${other ? ' two' : ''}`} onKeyDown={onKey}>
+    <div class={`layout debrief${other ? ' two' : ''}`}>
       <header>
         <h1>Trocar</h1>
         <span class="file" title={recording.organ}>
@@ -269,6 +273,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
         {props.link.recordingsKey && (
           <button onClick={() => void share(here())}>Copy link to this moment</button>
         )}
+        <ThemeButton />
         <button onClick={props.onClose}>Close</button>
       </header>
       <main>
@@ -278,6 +283,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
             guide={guide}
             isOld={false}
             isRecording
+            moreKeys={kClockKeys}
             follows={follows}
             people={people}
             onFollow={setFollows}
@@ -299,7 +305,12 @@ export function Debrief(props: DebriefProps): JSX.Element {
               </p>
             )}
             {copied && (
-              <p class="banner" role="status" onClick={() => setCopied('')}>
+              <p
+                class="banner"
+                role="status"
+                title="Click or Esc to close"
+                onClick={() => setCopied('')}
+              >
                 {copied}
               </p>
             )}

@@ -17,9 +17,11 @@ function Progress(props: { goal: Goal }): JSX.Element {
   const { stage, progress } = props.goal,
     seconds = Math.min(props.goal.seconds, stage.limitS),
     percent = Math.floor((progress?.progress ?? 0) * 100);
+  // An answer reaches what is to be found at once, or not.
+  const hasProgress = progress !== null && stage.goal !== LessonGoal.FIND;
   return (
     <>
-      {progress && (
+      {hasProgress && (
         <p class="far">
           <progress max={100} value={percent} aria-label="How far the goal is" />
           <span aria-hidden="true">{`${percent} %`}</span>

@@ -3,6 +3,7 @@
 import type { JSX } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { TeachAction, type Participant, type Participants } from './gen/proto/wire_pb';
+import { useEscape } from './keys';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
 import type { Session } from './session';
@@ -74,6 +75,7 @@ export function Manage(props: {
 }): JSX.Element | null {
   const { session, person: p } = props,
     [isOpen, setIsOpen] = useState(false);
+  useEscape(isOpen, () => setIsOpen(false));
   const act = (action: TeachAction, text = ''): void => session.teach(action, p, text);
   const hasTools = p.tool.length > 0,
     isFrozen = p.frozenBy !== '';
@@ -126,7 +128,7 @@ export function Manage(props: {
               onClick={() => act(TeachAction.TEACH_TAKE_CLAIM)}
               title="Jaws open and blades go up, until the hand has let go"
             >
-              Take claim away
+              Make let go
             </button>
           )}
           {hasTools && receivers.length > 0 && (
@@ -142,7 +144,7 @@ export function Manage(props: {
                   <option
                     key={`${r.slot} ${i}`}
                     value={`${r.slot} ${i}`}
-                  >{`${p.tool.length > 1 ? `instrument ${i + 1} ` : ''}to ${r.name}`}</option>
+                  >{`${p.tool.length > 1 ? `${i === 0 ? 'right' : 'left'} hand ` : ''}to ${r.name}`}</option>
                 )),
               )}
             </select>
@@ -317,6 +319,7 @@ export function ViewTools(props: {
   const { session, picture, leader, own } = props,
     [draws, setDraws] = useState(false),
     [follows, setFollows] = useState(false);
+  useEscape(draws, () => setDraws(false));
   usePen(draws && props.mayDraw, session, props.replica, picture);
   const leads = leader !== undefined && leader.slot === own;
   useEffect(() => {

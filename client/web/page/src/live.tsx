@@ -19,6 +19,7 @@ import { LessonPanel } from './goals';
 import { Marks, Pace } from './conduct';
 import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
 import { Hands, kFirst } from './hands';
+import { useEscape } from './keys';
 import { holdsTools, type Link } from './link';
 import { Events, ForcePlot, People } from './panels';
 import { changesOf, kindOf, kindOfTeaching, type EventKind, type RecordedEvent } from './recording';
@@ -26,6 +27,7 @@ import type { Replica } from './replica';
 import type { Picture } from './scene';
 import { Session } from './session';
 import { clock, forceOf, guideOf, Stage } from './stage';
+import { ThemeButton } from './theme';
 import { Tray } from './tray';
 
 const kPanelMs = 100,
@@ -162,7 +164,10 @@ export function Live(props: {
     rate = pace.current?.rate ?? 1;
   const isOld = session.state === 'away' || (!isPaused && age !== null && age > 1000),
     isLate = !isPaused && age !== null && age > session.oldAfterMs;
-  const mayMark = props.link.role === 'instructor' && session.state === 'live';
+  // Buttons stay where they are while the connection is lost, and do nothing.
+  const isLive = session.state === 'live',
+    wasIn = session.state !== 'joining';
+  const mayMark = props.link.role === 'instructor' && wasIn;
   const leader = people.current.find(p => p.leadsView);
   const end = (): void =>
     setAsks({
@@ -179,11 +184,9 @@ export function Live(props: {
         act: () => session.lead(LessonAction.LESSON_RESTART),
       }),
   };
-  const onKey = (event: KeyboardEvent): void => {
-    if (event.key === 'Escape') setAsks(null);
-  };
+  useEscape(asks !== null, () => setAsks(null));
   return (
-    <div class="layout" onKeyDown={onKey}>
+    <div class="layout">
       <header>
         <h1>Trocar</h1>
         <span class="time">{clock(now / 1000)}</span>
@@ -202,21 +205,26 @@ export function Live(props: {
                   ? 'live'
                   : `${Math.max(0, Math.round(age))} ms old`}
         </span>
-        {session.state === 'live' && rate < 1 && (
-          <span class="age late" role="status">{`time at ${Math.round(rate * 100)} %`}</span>
+        {isLive && rate < 1 && (
+          <span class="age late" role="status">
+            {`Time is slow, ${Math.round(rate * 100)} % of real speed. Go on.`}
+          </span>
         )}
         {isRecorded.current !== null && (
           <span class="age">{isRecorded.current ? 'recorded' : 'not recorded'}</span>
         )}
         {recording.current && <span class="age late">{recording.current}</span>}
         <span class="space" />
-        {mayMark && mayPace.current && <Pace session={session} pace={pace.current} />}
-        {mayMark && <Marks session={session} marks={marks.current} onAsk={setAsks} />}
         {mayMark && (
-          <button class="bad" onClick={end}>
-            End session
-          </button>
+          <span class="lead" inert={!isLive}>
+            {mayPace.current && <Pace session={session} pace={pace.current} />}
+            <Marks session={session} marks={marks.current} onAsk={setAsks} />
+            <button class="bad" onClick={end}>
+              End session
+            </button>
+          </span>
         )}
+        <ThemeButton />
         <button onClick={session.leave}>Leave</button>
       </header>
       <main>
@@ -235,7 +243,7 @@ export function Live(props: {
             hands.current.heed(own.current, people.current);
           }}
           tools={
-            session.state === 'live' && (
+            wasIn && (
               <ViewTools
                 session={session}
                 replica={replica}
@@ -246,7 +254,7 @@ export function Live(props: {
               />
             )
           }
-          {...(mayMark ? { onPoint: place => session.point(place) } : {})}
+          {...(mayMark && isLive ? { onPoint: place => session.point(place) } : {})}
         >
           {session.state === 'away' && (
             <p class="banner" role="alert">
@@ -317,7 +325,11 @@ export function Live(props: {
               }
             : {})}
         />
-        {mayMark && <Door session={session} list={list.current} />}
+        {mayMark && (
+          <div inert={!isLive}>
+            <Door session={session} list={list.current} />
+          </div>
+        )}
         <section aria-labelledby="forces">
           <h2 id="forces">
             Forces <small>last 30 s</small>
@@ -333,7 +345,11 @@ export function Live(props: {
           />
         </section>
         <Events events={events.current} now={now} empty="Nothing has happened yet." />
-        {session.state === 'live' && <Say session={session} mayNote={mayMark} />}
+        {wasIn && (
+          <div inert={!isLive}>
+            <Say session={session} mayNote={mayMark} />
+          </div>
+        )}
       </aside>
     </div>
   );

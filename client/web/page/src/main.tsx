@@ -9,6 +9,7 @@ import { kRoles, nameFault, readLink, rememberName, type Link, type Role } from 
 import { Live } from './live';
 import { ofFile, overHttp, Recording } from './recording';
 import { Replica } from './replica';
+import { ThemeButton } from './theme';
 
 const kRoleText: Record<Role, string> = {
   observer: 'an observer: you watch',
@@ -50,6 +51,9 @@ function Start(props: {
   };
   return (
     <main>
+      <div class="corner">
+        <ThemeButton />
+      </div>
       <form class="sheet" onSubmit={submit}>
         <h1>Join a session</h1>
         {props.why && (

@@ -4,6 +4,7 @@ import type { JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
 import { clock } from './stage';
+import { useTheme } from './theme';
 
 export interface Series {
   name: string;
@@ -37,7 +38,8 @@ export function Plot(props: {
     latest = useRef(props),
     drawn = useRef('');
   latest.current = props;
-  const { data } = props;
+  const { data } = props,
+    theme = useTheme();
   useEffect(() => {
     const size = new ResizeObserver(() =>
       plot.current?.setSize({
@@ -110,7 +112,7 @@ export function Plot(props: {
     });
     plot.current = made;
     drawn.current = look;
-  }, [data.version, data.what, data.seconds.length, data.seconds[0], data.series.length]);
+  }, [data.version, data.what, data.seconds.length, data.seconds[0], data.series.length, theme]);
   useEffect(() => plot.current?.redraw(false), [Math.floor(props.now / 50), props.range]);
   const greatest = data.series
     .map(

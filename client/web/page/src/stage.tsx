@@ -8,6 +8,7 @@ import { Overlay, Verb, type Replica, type Shape, type Tool, type Vec3 } from '.
 import type { Part, ViewCount } from './pane';
 import type { Guide } from './instruments';
 import { Picture } from './scene';
+import { KeysHelp, useEscape, useKeys, type KeyLine } from './keys';
 import { PaneChoices } from './views';
 
 export function forceOf(tool: Tool): number {
@@ -81,7 +82,7 @@ export function lendersOf(people: Participant[], tools: Tool[], isRecording: boo
   return tools.flatMap(({ slot }) => {
     const owner = people.find(p => p.slot === slot >> 1),
       form = owner?.tool[slot & 1]?.form,
-      second = (slot & 1) === 1 ? ', second hand' : '';
+      second = (slot & 1) === 1 ? ', left hand' : '';
     const isEndoscope = form === ToolForm.ENDOSCOPE || form === ToolForm.ENDOSCOPE_30;
     if (!owner || !(isEndoscope || isRecording)) return [];
     const degrees = form === ToolForm.ENDOSCOPE ? 0 : 30;
@@ -95,6 +96,8 @@ interface StageProps {
   guide: Guide;
   isOld: boolean; // the picture is not of now
   isRecording?: boolean;
+  isSecond?: boolean; // of two: keys are its own only while it has the focus
+  moreKeys?: KeyLine[]; // of what is around it, for the list of keys
   follows: number | null;
   people: Participant[];
   onFollow(slot: number | null): void;
@@ -235,13 +238,17 @@ export function Stage(props: StageProps): JSX.Element {
   const lenders = lendersOf(props.people, props.replica.tools(), props.isRecording ?? false);
   const seeWithNext = (): void =>
     setSees(lenders[lenders.findIndex(one => one.slot === sees) + 1]?.slot ?? null);
-  const onKey = (event: KeyboardEvent): void => {
+  const reach = props.isRecording ? 'r' : 'o'; // of a recording O ends a loop
+  useKeys((key, event) => {
     const p = picture.current,
-      step = event.shiftKey ? 0.02 : 0.1;
-    if (!p || event.ctrlKey || event.metaKey || event.altKey) return;
+      step = event.shiftKey ? 0.02 : 0.1,
+      hasFocus = event.target === canvas.current;
+    const isOthers = event.target instanceof HTMLCanvasElement && !hasFocus;
+    if (!p || isOthers || (props.isSecond && !hasFocus)) return false;
+    // Of a recording left and right move its time, unless the picture has the focus.
+    const sideways = !props.isRecording || hasFocus;
     const acts: Record<string, () => void> = {
-      ArrowLeft: () => p.turn(-step, 0),
-      ArrowRight: () => p.turn(step, 0),
+      ...(sideways ? { ArrowLeft: () => p.turn(-step, 0), ArrowRight: () => p.turn(step, 0) } : {}),
       ArrowUp: () => p.turn(0, step),
       ArrowDown: () => p.turn(0, -step),
       ...(props.onPlace ? { Enter: () => props.onPlace?.(0.5, 0.5) } : {}),
@@ -251,7 +258,7 @@ export function Stage(props: StageProps): JSX.Element {
       c: reset,
       ...(mayPoint ? { p: () => setPoints(!points) } : {}),
       l: () => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds),
-      o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions),
+      [reach]: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions),
       a: () => setArrows(!arrows),
       ...(lenders.length > 0 ? { t: seeWithNext } : {}),
       ...(mayDivide ? { v: () => setViews(views === 1 ? 2 : views === 2 ? 4 : 1) } : {}),
@@ -259,13 +266,27 @@ export function Stage(props: StageProps): JSX.Element {
         ? Object.fromEntries(parts.map((_, i) => [String(i + 1), () => p.activate(i)]))
         : {}),
     };
-    const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!act) return;
-    act();
-    event.preventDefault();
-    event.stopPropagation();
-  };
+    acts[key]?.();
+    return acts[key] !== undefined;
+  });
+  useEscape(sees !== null, () => setSees(null));
+  useEscape(points, () => setPoints(false));
 
+  const lines: KeyLine[] = [
+    {
+      keys: props.isRecording ? '↑ ↓; ← → in the picture' : 'arrow keys',
+      does: 'turn the view; with Shift in small steps',
+    },
+    { keys: '+, -', does: 'nearer, farther' },
+    { keys: 'C', does: 'the view as at the start' },
+    { keys: 'L', does: 'who holds what' },
+    { keys: reach.toUpperCase(), does: 'how far each force reaches' },
+    { keys: 'A', does: 'force arrows' },
+    { keys: 'T', does: 'see through an endoscope, or the next one' },
+    ...(mayDivide ? [{ keys: 'V, then 1 to 4', does: 'two or four views; which one moves' }] : []),
+    ...(mayPoint ? [{ keys: 'P', does: 'point: everybody sees where your pointer is' }] : []),
+    ...(props.isRecording ? [{ keys: 'Enter', does: 'measuring: take the middle' }] : []),
+  ];
   const keys = views === 2 ? '1 and 2' : '1 to 4';
   return (
     <div
@@ -275,7 +296,6 @@ export function Stage(props: StageProps): JSX.Element {
       <canvas
         ref={canvas}
         tabIndex={0}
-        onKeyDown={onKey}
         role="img"
         onPointerMove={onMove}
         onPointerDown={onPress}
@@ -360,7 +380,7 @@ export function Stage(props: StageProps): JSX.Element {
         <button
           aria-pressed={overlay === Overlay.Regions}
           onClick={() => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions)}
-          title="How far each force reaches (O)"
+          title={`How far each force reaches (${reach.toUpperCase()})`}
         >
           Reach
         </button>
@@ -396,6 +416,7 @@ export function Stage(props: StageProps): JSX.Element {
           </label>
         )}
         {props.tools}
+        {!props.isSecond && <KeysHelp lines={[...(props.moreKeys ?? []), ...lines]} />}
       </div>
     </div>
   );

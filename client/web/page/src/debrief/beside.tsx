@@ -61,11 +61,11 @@ export function BesideChoice(props: {
   };
   return (
     <section aria-labelledby="beside" class="beside">
-      <h2 id="beside">Beside another</h2>
+      <h2 id="beside">Compare with another</h2>
       {props.other ? (
         <div class="row">
           <span class="file">{props.other.name}</span>
-          <button onClick={() => props.onOther(null)}>Take it away</button>
+          <button onClick={() => props.onOther(null)}>Close</button>
         </div>
       ) : (
         <>
@@ -195,6 +195,8 @@ export function Beside(props: {
         replica={replica}
         guide={guide}
         isOld={false}
+        isRecording
+        isSecond
         follows={follows}
         people={player.people?.participant ?? []}
         onFollow={setFollows}

@@ -60,13 +60,13 @@ export function Check(props: {
         }[answer.state] ?? answer.text);
   return (
     <section aria-labelledby="check" class="check">
-      <h2 id="check">Does it verify?</h2>
+      <h2 id="check">Verify</h2>
       <p role="status" class={answer?.state === 'different' ? 'fault' : (answer?.state ?? '')}>
         {fault || said || 'The server can simulate it again and compare all that it says.'}
       </p>
       {tick !== null && <button onClick={() => props.onSeek(tick)}>Go there</button>}
       {(answer === null || answer.state === 'not asked' || answer.state === 'failed') && (
-        <button onClick={() => void ask('check')}>Check it</button>
+        <button onClick={() => void ask('check')}>Verify recording</button>
       )}
     </section>
   );

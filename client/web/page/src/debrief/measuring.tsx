@@ -3,6 +3,7 @@
 
 import type { JSX } from 'preact';
 import { useRef, useState } from 'preact/hooks';
+import { useEscape } from '../keys';
 import type { Replica } from '../replica';
 import type { Picture } from '../scene';
 import type { Course } from './course';
@@ -42,6 +43,7 @@ export function useOverlays(
     if (to === 'off') measure.current.clear();
     setKind(to);
   };
+  useEscape(kind !== 'off', () => choose('off'));
   const said = (): string => {
     const places = measure.current.positions();
     if (kind === 'distance')

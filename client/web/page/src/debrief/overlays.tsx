@@ -57,7 +57,7 @@ export function PathsPanel(props: {
 }): JSX.Element {
   return (
     <section aria-labelledby="paths">
-      <h2 id="paths">Ways of the tips</h2>
+      <h2 id="paths">Tip paths</h2>
       <div class="row">
         <button aria-pressed={props.isShown} onClick={() => props.onShow(!props.isShown)}>
           Show

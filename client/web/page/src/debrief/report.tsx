@@ -2,6 +2,7 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
+import { useEscape } from '../keys';
 import type { RecordedEvent } from '../recording';
 import type { PlotData } from '../plot';
 import { clock } from '../stage';
@@ -108,6 +109,7 @@ export function Report(props: { content: ReportContent; onClose(): void }): JSX.
   const { content: c } = props,
     box = useRef<HTMLDivElement>(null);
   useEffect(() => box.current?.focus(), []);
+  useEscape(true, props.onClose);
   return (
     <div
       class="report"
@@ -116,8 +118,7 @@ export function Report(props: { content: ReportContent; onClose(): void }): JSX.
       tabIndex={-1}
       ref={box}
       onKeyDown={event => {
-        event.stopPropagation();
-        if (event.key === 'Escape') props.onClose();
+        if (event.key !== 'Escape') event.stopPropagation();
       }}
     >
       <p class="row screen">

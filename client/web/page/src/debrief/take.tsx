@@ -81,7 +81,7 @@ export function Take(props: Props): JSX.Element {
   useEffect(() => stop, []);
   return (
     <section aria-labelledby="take" class="take">
-      <h2 id="take">Take along</h2>
+      <h2 id="take">Export</h2>
       <div class="row">
         <button onClick={() => void takePicture()}>Picture</button>
         <button aria-pressed={isRecording} onClick={() => (isRecording ? stop() : void begin())}>

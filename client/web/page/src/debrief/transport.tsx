@@ -1,6 +1,7 @@
 // The timeline with what happened on it, and the controls of the clock.
 
 import type { JSX } from 'preact';
+import type { KeyLine } from '../keys';
 import { kSpeeds } from '../player';
 import type { RecordedEvent } from '../recording';
 import { clock } from '../stage';
@@ -33,12 +34,17 @@ export function withEnd(clock: Clock, tick: number): Range {
   return [clock.range && clock.range[0] < tick ? clock.range[0] : clock.first, tick];
 }
 
+export const kClockKeys: KeyLine[] = [
+  { keys: 'Space, K', does: 'play, pause' },
+  { keys: '←, →', does: '2 s back, forward; also J and ;' },
+  { keys: ', .', does: 'a frame back, forward' },
+  { keys: 'Home, End', does: 'to the start, to the end' },
+  { keys: '<, >', does: 'slower, faster' },
+  { keys: 'I, O, X', does: 'loop start, loop end, no loop' },
+];
+
 // What keys do. Returns false for others.
-export function keyActs(clock: Clock, event: KeyboardEvent): boolean {
-  const target = event.target as HTMLElement,
-    isField = target instanceof HTMLInputElement && target.type !== 'range';
-  if (event.ctrlKey || event.metaKey || event.altKey || target.tagName === 'SELECT' || isField)
-    return false;
+export function keyActs(clock: Clock, key: string): boolean {
   const faster = (by: number): void =>
     clock.setSpeed(
       kSpeeds[Math.max(0, Math.min(kSpeeds.length - 1, kSpeeds.indexOf(clock.speed) + by))] ?? 1,
@@ -56,17 +62,12 @@ export function keyActs(clock: Clock, event: KeyboardEvent): boolean {
     i: () => clock.setRange(withStart(clock, clock.tick)),
     o: () => clock.setRange(withEnd(clock, clock.tick)),
     x: () => clock.setRange(null),
-    ...(target.tagName === 'BUTTON' ? {} : { ' ': clock.toggle }),
-    ...(target.tagName === 'INPUT'
-      ? {}
-      : {
-          ArrowLeft: () => clock.seek(clock.tick - kStep),
-          ArrowRight: () => clock.seek(clock.tick + kStep),
-        }),
+    ' ': clock.toggle,
+    ArrowLeft: () => clock.seek(clock.tick - kStep),
+    ArrowRight: () => clock.seek(clock.tick + kStep),
   };
-  const act = acts[event.key];
-  act?.();
-  return act !== undefined;
+  acts[key]?.();
+  return acts[key] !== undefined;
 }
 
 export function Timeline(props: {
@@ -117,14 +118,14 @@ export function Controls(props: { clock: Clock }): JSX.Element {
   const { clock: c } = props;
   return (
     <div class="controls">
-      <button class="main" onClick={c.toggle} title="Space">
+      <button class="main" onClick={c.toggle} title="Play, pause (space bar)">
         {c.isPlaying ? 'Pause' : 'Play'}
       </button>
-      <button onClick={() => c.seek(c.tick - kStep)} title="Left arrow">
-        − 2 s
+      <button onClick={() => c.seek(c.tick - kStep)} title="Back (left arrow)">
+        Back 2 s
       </button>
-      <button onClick={() => c.seek(c.tick + kStep)} title="Right arrow">
-        + 2 s
+      <button onClick={() => c.seek(c.tick + kStep)} title="Forward (right arrow)">
+        Forward 2 s
       </button>
       <label class="choice">
         Speed
@@ -140,11 +141,11 @@ export function Controls(props: { clock: Clock }): JSX.Element {
         </select>
       </label>
       <span class="loop" role="group" aria-label="Loop">
-        <button onClick={() => c.setRange(withStart(c, c.tick))} title="Play again from here (I)">
-          Loop from here
+        <button onClick={() => c.setRange(withStart(c, c.tick))} title="The loop begins here (I)">
+          Loop start
         </button>
-        <button onClick={() => c.setRange(withEnd(c, c.tick))} title="Up to here (O)">
-          to here
+        <button onClick={() => c.setRange(withEnd(c, c.tick))} title="The loop ends here (O)">
+          Loop end
         </button>
         {c.range && (
           <button onClick={() => c.setRange(null)} title="Loop no more (X)">
