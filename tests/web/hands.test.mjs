@@ -47,7 +47,7 @@ test('the other hand cuts by the left button, and what is hidden lets go', async
   const { page, slot } = await surgeon('Cut');
   const [x, y] = await middle(page);
   await page.mouse.move(x, y);
-  await page.keyboard.press('h');
+  await page.keyboard.press('g');
   await page.locator('.tray h2', { hasText: 'Your left hand' }).waitFor({ timeout: kPatience });
   await page.mouse.move(x - 60, y);
   await until('the left tool', () => toolOf(page, slot + 1));

@@ -3,7 +3,7 @@
 //
 //   left button, one finger   what the instrument is for      wheel, W and S   deeper, nearer
 //   F, Space, X               push, grasp, cut                Q and E          turn it
-//   Tab over the picture, H   the other hand                  1 to 9           another instrument
+//   Tab over the picture, G   the other hand                  1 to 9           another instrument
 //   I, J, K, L                up, left, down, right, for whoever has no mouse; Shift: a quarter
 //
 // Samples leave as often as the window's, also while nothing is drawn. A page that is hidden lets go
@@ -12,6 +12,7 @@
 import { create } from '@bufbuild/protobuf';
 import { instruments } from './gen/instruments';
 import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
+import type { KeyLine } from './keys';
 import { Verb, type HandInput, type HandSample, type Replica, type Tool } from './replica';
 import type { Picture } from './scene';
 import type { Session } from './session';
@@ -57,6 +58,15 @@ const kKeys: Record<string, keyof HandInput> = {
   q: 'rollLeft',
   e: 'rollRight',
 };
+// For the list of keys.
+export const handKeys: KeyLine[] = [
+  { keys: 'F, Space, X', does: 'push, grasp, cut' },
+  { keys: 'W, S', does: 'deeper, nearer' },
+  { keys: 'Q, E', does: 'turn the instrument' },
+  { keys: 'G; Tab over the picture', does: 'the other hand' },
+  { keys: '1 to 9', does: 'another instrument' },
+  { keys: 'I, J, K, L', does: 'move it without a mouse; with Shift in small steps' },
+];
 const kSteps: Record<string, readonly [number, number]> = {
   i: [0, -1],
   j: [-1, 0],
@@ -311,12 +321,12 @@ export class Hands {
     const digit = /^[1-9]$/.test(name) ? Number(name) : 0;
     if (held !== undefined) Object.assign(this.input, { [held]: isDown });
     else if (name in kSteps) isDown && this.steps.add(name);
-    else if (!(isTab || name === 'h' || digit > 0)) return;
+    else if (!(isTab || name === 'g' || digit > 0)) return;
     event.preventDefault();
     event.stopPropagation();
     if (!isDown || event.repeat) return;
     this.hasLetGo = false;
-    if (isTab || name === 'h') this.switchHand();
+    if (isTab || name === 'g') this.switchHand();
     else if (digit > 0) this.take(digit - 1);
   }
 }

@@ -18,7 +18,7 @@ import { BloodPanel } from './blood';
 import { LessonPanel } from './goals';
 import { Marks, Pace } from './conduct';
 import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
-import { Hands, kFirst } from './hands';
+import { Hands, handKeys, kFirst } from './hands';
 import { useEscape } from './keys';
 import { holdsTools, type Link } from './link';
 import { Events, ForcePlot, People } from './panels';
@@ -236,6 +236,7 @@ export function Live(props: {
           people={people.current}
           onFollow={setFollows}
           onPicture={() => undefined}
+          {...(holdsTools(props.link.role) ? { keys: handKeys } : {})}
           onReady={p => {
             picture.current = p;
             if (!holdsTools(props.link.role)) return;

@@ -110,6 +110,7 @@ interface StageProps {
   // Where this person points, if the role may; null: nowhere any more.
   onPoint?: (place: Vec3 | null) => void;
   tools?: ComponentChildren; // more buttons of the view
+  keys?: KeyLine[]; // of the person's hands, which come before the picture's
   children?: ComponentChildren;
 }
 
@@ -273,13 +274,14 @@ export function Stage(props: StageProps): JSX.Element {
   useEscape(points, () => setPoints(false));
 
   const lines: KeyLine[] = [
+    ...(props.keys ?? []),
     {
       keys: props.isRecording ? '↑ ↓; ← → in the picture' : 'arrow keys',
       does: 'turn the view; with Shift in small steps',
     },
     { keys: '+, -', does: 'nearer, farther' },
     { keys: 'C', does: 'the view as at the start' },
-    { keys: 'L', does: 'who holds what' },
+    ...(props.keys ? [] : [{ keys: 'L', does: 'who holds what' }]),
     { keys: reach.toUpperCase(), does: 'how far each force reaches' },
     { keys: 'A', does: 'force arrows' },
     { keys: 'T', does: 'see through an endoscope, or the next one' },

@@ -18,7 +18,7 @@ export function Tray(props: { hands: Hands; tools: Tool[]; onDone(): void }): JS
       <h2 id="tray">
         Your {nameOf(hands.moved)}
         <button
-          title="Tab over the picture, or H"
+          title="Tab over the picture, or G"
           onClick={() => {
             hands.switchHand();
             props.onDone();
@@ -79,7 +79,7 @@ export function Tray(props: { hands: Hands; tools: Tool[]; onDone(): void }): JS
           </button>
         ))}
       </div>
-      <p class="keys">
+      <p class="how">
         Left button or one finger: use it. Right button or two fingers: the view. F push, Space
         grasp, X cut, Q and E turn. Without a mouse: I, J, K and L move it.
       </p>
