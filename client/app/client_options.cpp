@@ -11,10 +11,11 @@
 #include <map>
 
 #include "client/ui/hud.h"
-#include "common/base/number_option.h"
 #include "common/base/printable.h"
 #include "common/base/size_option.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
+#include "common/command_line/limits.h"
 #include "common/secure/join_code.h"
 #include "common/wire/role.h"
 
@@ -56,7 +57,7 @@ std::string version_text() {
 
 Status parse_overlays(const std::vector<std::string>& names, Overlays& overlays) {
   if (names.empty()) return {};
-  overlays = {.arrows = false};
+  overlays = {};
   const std::map<std::string, bool Overlays::*> known = {{"regions", &Overlays::regions},
                                                          {"holds", &Overlays::holds},
                                                          {"arrows", &Overlays::arrows},
@@ -224,6 +225,12 @@ struct GivenTexts {
   const CLI::Option* server = nullptr;
 };
 
+std::vector<std::string> role_names() {
+  std::vector<std::string> names;
+  for (const auto& known : wire::kRoles) names.emplace_back(known.name);
+  return names;
+}
+
 void add_session_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--join", options.join,
                  "join code or link, as the server printed it; not needed for your own server on "
@@ -247,13 +254,13 @@ void add_session_options(CLI::App& app, ClientOptions& options, GivenTexts& more
                "frames and hands over the TCP stream alone");
   app.add_option("--wait", options.wait_s, "how long to try while no server is there yet")
       ->type_name("S")
-      ->check(from_to(0, 3600))
+      ->check(command_line::from_to(0, 3600))
       ->capture_default_str();
   app.add_option("--name", options.name, "how others see you, unique in the session")
       ->type_name("NAME");
   app.add_option("--role", more.role,
                  "surgeon, assistant (with tools), instructor, observer (watch)")
-      ->check(CLI::IsMember(more.roles))
+      ->check(command_line::one_of(role_names()))
       ->type_name("ROLE")
       ->capture_default_str();
   app.add_flag(
@@ -268,15 +275,15 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_option("--scale", options.scale,
                  "how large words and panels are, as far as they fit [as the monitor says]")
       ->type_name("FACTOR")
-      ->check(from_to(double{ui::kLeastScale}, double{ui::kMostScale}));
+      ->check(command_line::from_to(double{ui::kLeastScale}, double{ui::kMostScale}));
   app.add_option("--fps", options.pictures_per_second,
                  "pictures per second [window 60, headless 15, fewer in software]")
       ->type_name("N")
-      ->check(from_to(1, 240));
+      ->check(command_line::from_to(1, 240));
   app.add_option(
          "--show", more.overlays,
          "what is drawn over the picture: regions, holds, arrows, rate, or nothing; keys change "
-         "it [regions,arrows]")
+         "it [nothing]")
       ->type_name("A,B")
       ->delimiter(',');
   app.add_option("--view", more.view, "turn the camera at first, degrees, and go nearer [0,0,1]")
@@ -291,24 +298,24 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_option("--screenshot-at", options.screenshot_at,
                  "seconds after joining at which it is taken [the last picture]")
       ->type_name("S")
-      ->check(from_to(0, 1e6));
+      ->check(command_line::from_to(0, 1e6));
 }
 
 void add_time_options(CLI::App& app, ClientOptions& options) {
   app.add_option("--seconds", options.seconds, "leave after this many seconds")
       ->type_name("N")
-      ->check(from_to(0, 1e9));
+      ->check(command_line::from_to(0, 1e9));
   app.add_option("--answer-at", options.answer_at,
                  "in a lesson: say that it is here so many simulated seconds after joining")
       ->type_name("S")
-      ->check(from_to(0, 1e6));
+      ->check(command_line::from_to(0, 1e6));
   app.add_option("--mark-at", options.mark_at,
                  "as instructor: mark the organ so many simulated seconds after joining")
       ->type_name("S")
-      ->check(from_to(0, 1e6));
+      ->check(command_line::from_to(0, 1e6));
   app.add_option("--return-at", options.return_at, "as instructor: return it to the mark then")
       ->type_name("S")
-      ->check(from_to(0, 1e6));
+      ->check(command_line::from_to(0, 1e6));
 }
 
 void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
@@ -333,7 +340,7 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
                  "instruments of your own instead of these (TOML, as common/tool/instruments.toml)")
       ->type_name("FILE");
   app.add_option("--hands", options.mouse_hands, "hands of a person with a mouse")
-      ->check(CLI::Range(1, kToolsPerHand))
+      ->check(command_line::whole_from_to(1, kToolsPerHand))
       ->capture_default_str();
   app.add_option("--port", more.ports,
                  "point that a device's shaft passes, mm, as a trocar holds a laparoscopic "
@@ -344,12 +351,12 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--device-motion", options.device_motion,
                  "how far the tool goes where the device goes 1")
       ->type_name("SCALE")
-      ->check(from_to(0.01, 20))
+      ->check(command_line::from_to(0.01, 20))
       ->capture_default_str();
   app.add_option("--device-force", options.device_force,
                  "the force on the hand where the tool feels 1")
       ->type_name("SCALE")
-      ->check(from_to(0, 10))
+      ->check(command_line::from_to(0, 10))
       ->capture_default_str();
   app.add_option("--hand-trace", options.trace_file,
                  "write what each device did and felt, a row for each millisecond (CSV)")
@@ -365,7 +372,7 @@ void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more)
   app.add_option("--align", more.align,
                  "with --beside: let both begin at their start, or each stage of a lesson begin "
                  "together: start, stage [stage where both have it]")
-      ->check(CLI::IsMember({"start", "stage"}))
+      ->check(command_line::one_of({"start", "stage"}))
       ->type_name("BY");
   app.add_flag("--own-views", options.has_own_views,
                "with --beside: turn each of the two by itself");
@@ -374,14 +381,14 @@ void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more)
       ->type_name("FOLDER");
   app.add_option("--from", options.series_from_s, "with --pictures: first second of the recording")
       ->type_name("S")
-      ->check(from_to(0, 1e6));
+      ->check(command_line::from_to(0, 1e6));
   app.add_option("--to", options.series_to_s, "with --pictures: last second; 0: the end")
       ->type_name("S")
-      ->check(from_to(0, 1e6));
+      ->check(command_line::from_to(0, 1e6));
   app.add_option("--rate", options.series_rate,
                  "with --pictures: of them per second of the recording")
       ->type_name("N")
-      ->check(from_to(0.1, 120))
+      ->check(command_line::from_to(0.1, 120))
       ->capture_default_str();
   app.add_option("--feel", more.feels,
                  "with --replay and --device: feel what this participant felt, with tool 0 or 1; "
@@ -392,7 +399,7 @@ void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more)
   app.add_option("--feel-pull", options.feel_pull_n_m,
                  "stiffness of the spring that leads the hand along with --feel, N/m; 0: none")
       ->type_name("N/M")
-      ->check(from_to(0, 500))
+      ->check(command_line::from_to(0, 500))
       ->capture_default_str();
 }
 
@@ -465,14 +472,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   app.add_option("--corrupt-frame", options.corrupt_frame, "")->group("");
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {  // --help and --version
-    app.exit(success);
-    return std::optional<ClientOptions>{};
-  } catch (const CLI::ParseError& error) {
-    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<ClientOptions>();
   if (const auto read = read_further(more, options); !read) return read.error();
   return std::optional<ClientOptions>(std::move(options));
 }

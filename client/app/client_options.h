@@ -20,7 +20,7 @@ enum class Display : std::uint8_t { Window, Headless, None };
 
 // These overlays are drawn over the picture; keys switch them.
 struct Overlays {
-  bool regions = false, holds = false, arrows = true, rate = false;
+  bool regions = false, holds = false, arrows = false, rate = false;
 
   bool operator==(const Overlays&) const = default;
 };

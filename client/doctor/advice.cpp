@@ -62,9 +62,7 @@ class Judgement {
 
   void add_server() {
     const auto& visit = measured_.visit;
-    if (visit.server.empty())
-      return add("server", Grade::Impossible, visit.problem,
-                 "Ask the teacher for the link, and run: trocar-doctor --join LINK");
+    if (visit.server.empty()) return;  // the machine alone is judged
     if (visit.address.empty())
       return add("server", Grade::Impossible, visit.problem,
                  "Check the name, or give the address in numbers; a school's name server may not "
@@ -174,6 +172,13 @@ class Judgement {
           advice_.verdict += " " + finding.text;
           break;
         }
+      return;
+    }
+    if (measured_.visit.server.empty()) {
+      advice_.verdict = fmt::format(
+          "This machine can take part{}. No session was tried ({}): with a link, "
+          "trocar-doctor --join LINK tries that, too.",
+          advice_.grade == Grade::Good ? "" : ", with limits", measured_.visit.problem);
       return;
     }
     if (!measured_.visit.is_joined) {

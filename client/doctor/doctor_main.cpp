@@ -9,10 +9,11 @@
 #include "client/doctor/machine.h"
 #include "client/doctor/visitor.h"
 #include "common/base/log.h"
-#include "common/base/number_option.h"
 #include "common/base/program.h"
 #include "common/base/stdout_check.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
+#include "common/command_line/limits.h"
 #include "common/discovery/finder.h"
 #include "common/secure/join_code.h"
 #include "common/secure/link_file.h"
@@ -31,7 +32,7 @@ Examples:
   trocar-doctor 192.168.1.20:7690
       finds out whether the server can be reached
   trocar-doctor
-      tries your own server on this machine, or the first session that announces itself
+      tries this machine, and your own server on it or the first session that announces itself
   trocar-doctor --json --join CODE 192.168.1.20 > doctor.json
       the same for administrators and scripts
 
@@ -61,21 +62,16 @@ Result<std::optional<DoctorOptions>> parse(int argc, char** argv) {
                "without TLS, for a server on this machine that was started so");
   app.add_option("--seconds", visit.seconds, "how long the session is measured")
       ->type_name("S")
-      ->check(from_to(1, 600))
+      ->check(command_line::from_to(1, 600))
       ->capture_default_str();
   app.add_option("--wait", visit.wait_s, "how long to wait for an answer")
       ->type_name("S")
-      ->check(from_to(0.5, 600))
+      ->check(command_line::from_to(0.5, 600))
       ->capture_default_str();
   app.add_flag("--json", options.is_json, "write figures and words as JSON");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {
-    app.exit(success);
-    return std::optional<DoctorOptions>{};
-  } catch (const CLI::ParseError& error) {
-    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<DoctorOptions>();
   if (!visit.join.empty()) {
     const auto invitation = secure::parse_invitation(visit.join);
     if (!invitation) return Error{ErrorCode::Usage, "--join: " + invitation.error().message};
@@ -98,9 +94,8 @@ void choose_server(VisitOptions& visit, Measurements& measured) {
   if (!measured.sessions.empty())
     visit.server = measured.sessions.front();
   else
-    measured.visit.problem = found ? "No server was named, and no session announces itself here."
-                                   : "No server was named, and no Avahi daemon runs here to find "
-                                     "one.";
+    measured.visit.problem =
+        found ? "no session announces itself here" : "no Avahi daemon runs here to find one";
 }
 
 int run(int argc, char** argv) {

@@ -11,6 +11,7 @@
 #include "common/base/program.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
 #include "server/app/edit_command/edit_command.h"
 #include "server/organs/edit/save.h"
 #include "server/organs/material/material_file.h"
@@ -59,12 +60,9 @@ int run(int argc, char** argv) {
   app.add_option("--log-level", log_level, "error, warn, info, debug or off")
       ->capture_default_str();
   edit_command::add_options(app, command);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return report("trocar-organ", {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return report("trocar-organ", parsed.error());
+  if (!*parsed) return static_cast<int>(ExitCode::Ok);
   if (const auto set = log::configure("trocar-organ", log_level); !set)
     return report("trocar-organ", set.error());
   const auto stop = [](int) { stop_requested = 1; };

@@ -23,6 +23,7 @@ constexpr std::chrono::milliseconds kRoomRetry{2};
 constexpr std::size_t kBuffersPerWrite = 16;
 constexpr std::size_t kMaxByeBytes = 200;
 constexpr std::chrono::milliseconds kEndPoll{1};  // of a connection's coroutines
+constexpr const char* kUnknownName = "no machine is known by this name";
 
 }  // namespace
 
@@ -279,8 +280,11 @@ void NetSource::Session::say_waiting(const std::string& why) const {
 }
 
 void NetSource::Session::end_unreachable(const std::string& why) {
-  end(replica::CloseKind::Unreachable, "no server at " + server_name() + " (" + why +
-                                           "): start trocar-server, or check address and port");
+  const bool is_unknown = why == kUnknownName;
+  end(replica::CloseKind::Unreachable,
+      "no server at " + server_name() + " (" + why + "): " +
+          (is_unknown ? "check how it is spelt, or give the address that the server printed"
+                      : "start trocar-server, or check address and port"));
 }
 
 void NetSource::Session::check_silence() {
@@ -326,7 +330,7 @@ asio::awaitable<bool> NetSource::Session::try_to_connect(Clock::time_point deadl
   const auto place = places_[place_];
   const auto port = std::to_string(place.port);
   const auto [unresolved, endpoints] = co_await resolver_.async_resolve(place.host, port, kNoThrow);
-  if (unresolved) why_not_ = unresolved.message();
+  if (unresolved) why_not_ = kUnknownName;
   for (const auto& endpoint : endpoints) {
     if (is_done_ || Clock::now() >= deadline) break;
     boost::system::error_code ignored;

@@ -1,5 +1,6 @@
 #include <set>
 
+#include "common/base/nearest_word.h"
 #include "common/lesson/lesson.h"
 #include "common/lesson/lesson_texts.h"
 #include "common/tool/toml_reader.h"
@@ -273,9 +274,14 @@ Result<Lesson> find_lesson(const std::string& name_or_file) {
                                         source + ": picture " + wanted + ": is not there"};
                          });
   }
-  if (name_or_file.find_first_of("./") == std::string::npos)
-    return Error{ErrorCode::Usage, "there is no lesson \"" + name_or_file + "\", the lessons are " +
-                                       list_lessons() + ", or name a file"};
+  if (name_or_file.find_first_of("./") == std::string::npos) {
+    std::vector<std::string> names;
+    for (const auto& [name, text] : lesson_texts()) names.push_back(name);
+    const auto meant = did_you_mean(name_or_file, names);
+    return Error{ErrorCode::Usage, "there is no lesson \"" + name_or_file + "\"" +
+                                       (meant.empty() ? "." : meant) + " The lessons are " +
+                                       list_lessons() + "; or name a file"};
+  }
   return read_lesson(name_or_file);
 }
 

@@ -34,7 +34,7 @@ constexpr LargeClass kLargeClasses[] = {
     {"server/watch/page", "Seat", 53, "a browser's place and its pace"},
     {"server/watch/follow", "SessionCopy", 54, "each message of a session has a method"},
 };
-constexpr std::size_t kLongFunctions = 39, kWideFunctions = 16;
+constexpr std::size_t kLongFunctions = 38, kWideFunctions = 16;
 
 const SourceTree& tree() {
   static const SourceTree kTree = read_source_tree(TROCAR_SOURCE_DIR);

@@ -149,7 +149,7 @@ check_options() {
     [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
     help_of "$bin/$program" | options_of_help >>"$known"
-    for sub in $(help_of "$bin/$program" | awk '/^Subcommands:|^SUBCOMMANDS:/ {f = 1; next} /^[^ ]/ {f = 0} f && /^  [a-z]/ {print $1}'); do
+    for sub in $(help_of "$bin/$program" | awk '/^Commands:/ {f = 1; next} /^[^ ]/ {f = 0} f && /^  [a-z]/ {print $1}'); do
       check_section "### $program $sub" "$bin/$program" "$sub"
       help_of "$bin/$program" "$sub" | options_of_help >>"$known"
     done

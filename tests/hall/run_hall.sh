@@ -110,7 +110,7 @@ test_sessions() {
   refuses 'is damaged' 's|^state = .*|state = "damaged"|'
   code=0
   "$bin/trocar-hall" start --key file 2>said || code=$?
-  [ $code = 2 ] && grep -q 'LESSON is required' said || fail "a start of nothing: $code, $(cat said)"
+  [ $code = 2 ] && grep -q 'LESSON: is missing' said || fail "a start of nothing: $code, $(cat said)"
   start_hall --log-format json
   [ "$(stat -c %a hall.key)" = 600 ] || fail "others may read the key"
   [ "$(curl -s "http://$at/healthz")" = ok ] || fail "it is not healthy"

@@ -98,10 +98,76 @@ TEST_F(Organ, WritesNoProgressIntoAFile) {
   EXPECT_FALSE(log_has("\r")) << log();
 }
 
+TEST_F(Organ, IsListedByTheNamesThatMakeTakes) {
+  ASSERT_EQ(run({"list"}), 0) << log();
+  EXPECT_TRUE(log_has("elastic-liver  of neo-Hookean tets")) << log();
+  EXPECT_EQ(run({"make", "spleen"}), 2);
+  expect_line("'spleen' is no built-in organ. There are liver, elastic-liver, ");
+  expect_line("trocar-organ import FILE makes an organ");
+  EXPECT_EQ(run({"make", "livr"}), 2);
+  expect_line("'livr' is no built-in organ, did you mean liver?");
+}
+
+TEST_F(Organ, SaysWhatWasProbablyMeant) {
+  EXPECT_EQ(run({"mkae", "liver"}), 2);
+  expect_line("mkae: is no command of trocar-organ, did you mean make? (see trocar-organ --help)");
+  EXPECT_EQ(run({"make", "liver", "--tet", "9"}), 2);
+  expect_line(
+      "--tet: is no option of trocar-organ make, did you mean --tets? (see trocar-organ make "
+      "--help)");
+  EXPECT_EQ(run({}), 2);
+  expect_line("a command is missing, choose one of make, list, import");
+  EXPECT_EQ(run({"make"}), 2);
+  expect_line("NAME: is missing, give it");
+  EXPECT_EQ(run({"import", "cube.msh", "--nodes", "many"}), 2);
+  expect_line("--nodes: 'many' is not a number");
+  EXPECT_EQ(run({"make", "liver", "--out"}), 2);
+  expect_line("--out: has no value, give one");
+}
+
+TEST_F(Organ, HelpOfACommandHasItsOwnExamples) {
+  ASSERT_EQ(run({"settle", "--help"}), 0);
+  EXPECT_TRUE(log_has("Examples:\n  trocar-organ settle spleen.organ")) << log();
+  EXPECT_TRUE(log_has("into spleen-settled.organ")) << log();
+  EXPECT_FALSE(log_has("trocar-organ fit")) << log();
+}
+
+class Journal : public testing::ProgramFixture {
+ protected:
+  Journal() : ProgramFixture("trocar-journal") {}
+};
+
+TEST_F(Journal, ListsItsCommandsForOneThatNobodyCouldMean) {
+  EXPECT_EQ(run({"show", "session.mcap"}), 2);
+  expect_line("show: is no command of trocar-journal, choose one of info, verify");
+}
+
 class Server : public testing::ProgramFixture {
  protected:
   Server() : ProgramFixture("trocar-server") {}
 };
+
+TEST_F(Server, SaysWhichLessonOptionOrWordWasMeant) {
+  EXPECT_EQ(run({"--lesson", "find-the-lmup"}), 2);
+  expect_line("there is no lesson \"find-the-lmup\", did you mean find-the-lump?");
+  EXPECT_EQ(run({"--max-watcher", "3"}), 2);
+  expect_line("--max-watcher: is no option of trocar-server, did you mean --max-watchers?");
+  EXPECT_EQ(run({"--log-level", "wran"}), 2);
+  expect_line("--log-level: wran is none of error, warn, info, debug, off, did you mean warn?");
+  EXPECT_EQ(run({"--max-hands", "3.5"}), 2);
+  expect_line("--max-hands: 3.5 is not a whole number from 1 to ");
+  EXPECT_EQ(run({"--organ", "stomac", "--journal", "none"}), 3);
+  expect_line("'stomac' is no built-in organ, did you mean stomach?");
+}
+
+TEST_F(Server, HelpShowsNothingOfTheLibraryThatReadsOptions) {
+  ASSERT_EQ(run({"--help"}), 0);
+  const auto help = log();
+  for (const char* leak : {"Option Group", "UINT", "INT in", " in [", "REQUIRED", "Needs:"})
+    EXPECT_EQ(help.find(leak), std::string::npos) << leak << "\n" << help;
+  EXPECT_NE(help.find("\nAccess, who may join:\n"), std::string::npos) << help;
+  EXPECT_NE(help.find("--max-newcomers N (4 to 1000)"), std::string::npos) << help;
+}
 
 TEST_F(Server, HelpHasTheTrainersOptionsFirstAndTheSolversLast) {
   ASSERT_EQ(run({"--help"}), 0);
@@ -161,6 +227,25 @@ TEST_F(Client, WaitsForAServerThatIsStartedAfterIt) {
   EXPECT_EQ(wait(), 0);
 }
 
+TEST_F(Client, SaysWhichRoleOrOptionWasMeant) {
+  EXPECT_EQ(run({"--rol", "observer"}), 2);
+  expect_line(
+      "--rol: is no option of trocar-client, did you mean --role? (see trocar-client --help)");
+  EXPECT_EQ(run({"--role", "surgoen"}), 2);
+  expect_line("surgoen is none of surgeon, ");
+  expect_line("did you mean surgeon?");
+}
+
+TEST_F(Client, SaysThatNoMachineHasThisName) {
+  EXPECT_EQ(run({"--server", "nobody.invalid:7690", "--join", "7K3M-9QXZ-4T2B-WN8C", "--no-render",
+                 "--name", "Alone", "--wait", "0.1"}),
+            5);
+  EXPECT_NE(log().find("no server at nobody.invalid:7690 (no machine is known by this name): check "
+                       "how it is spelt"),
+            std::string::npos)
+      << log();
+}
+
 TEST_F(Client, GivesUpAfterTheTimeThatItWasGiven) {
   EXPECT_EQ(run({"--server", free_address(), "--no-render", "--name", "Alone", "--wait", "0.3"}),
             5);
@@ -171,6 +256,11 @@ class Sim : public testing::ProgramFixture {
  protected:
   Sim() : ProgramFixture("trocar-sim") {}
 };
+
+TEST_F(Sim, SaysWhatTakesAScriptOfHands) {
+  EXPECT_EQ(run({std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/lift.toml"}), 3);
+  expect_line("give it to trocar-client --script");
+}
 
 // The example hangs at rest before it is pulled: at first the held nodes bear exactly its weight,
 // and nothing rings.

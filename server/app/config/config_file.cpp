@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "common/base/printable.h"
+#include "common/command_line/command_line.h"
 #include "common/tool/toml_reader.h"
 
 namespace trocar::app {
@@ -131,6 +132,7 @@ Status check_option(CLI::App& app, const std::string& key, const std::string& te
 
 Result<bool> parse_with_config(CLI::App& app, int argc, char** argv, CheckOption check,
                                OptionOrigins& origins, const char* example) {
+  command_line::prepare_help(app);
   app.config_formatter(std::make_shared<ConfigReader>(app, std::move(check), origins, example));
   const auto usage = [&origins](const std::string& message) {
     return Error{ErrorCode::Usage, origins.placed(message)};
@@ -142,9 +144,8 @@ Result<bool> parse_with_config(CLI::App& app, int argc, char** argv, CheckOption
   } catch (const CLI::ConfigError& error) {
     return usage(error.what());
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) return usage(std::string(error.what()) + " (see --help)");
-    app.exit(error);
-    return false;
+    const auto answered = command_line::answer(app, error);
+    return answered ? answered : usage(answered.error().message);
   }
   return true;
 }

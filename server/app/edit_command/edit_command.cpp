@@ -5,8 +5,8 @@
 #include <filesystem>
 
 #include "common/base/log.h"
-#include "common/base/number_option.h"
 #include "common/base/size_option.h"
+#include "common/command_line/limits.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/dicom/dicom_reader.h"
 #include "server/organs/edit/box_rule.h"
@@ -179,7 +179,7 @@ void add_options(CLI::App& app, EditCommand& command) {
       ->capture_default_str();
   app.add_option("--scale", command.scale, "of words and panels [as the monitor says]")
       ->type_name("S")
-      ->check(from_to(0.75, 3));
+      ->check(command_line::from_to(0.75, 3));
 }
 
 Result<std::pair<int, int>> window_size(const EditCommand& command) {

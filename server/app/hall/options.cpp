@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
 #include "server/app/config/log_options.h"
 #include "server/app/config/nats_options.h"
 
@@ -110,14 +111,9 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
   end->add_option("NAME", options.what, "name of the session")->required()->type_name("");
   for (auto* command : {list, start})
     command->add_flag("--json", options.is_json, "write JSON, for scripts");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0)
-      return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
-    app.exit(error);
-    return std::optional<HallOptions>();
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<HallOptions>();
   if (!options.nats.url.empty())
     if (const auto place = bus::check_place(options.nats); !place) return place.error();
   options.command = list->parsed()    ? HallCommand::List
@@ -130,7 +126,7 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
                    "--config: is missing, name a file, or give one of list, start and end"};
     return std::optional(std::move(options));
   }
-  if (const auto parsed = parse_at(options); !parsed) return parsed.error();
+  if (const auto placed = parse_at(options); !placed) return placed.error();
   if (options.key_file.empty() && options.command != HallCommand::List)
     return Error{ErrorCode::Usage, "--key: is missing, name the file of the hall's key"};
   return std::optional(std::move(options));

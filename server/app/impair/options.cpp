@@ -6,8 +6,9 @@
 #include <charconv>
 #include <cmath>
 
-#include "common/base/number_option.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
+#include "common/command_line/limits.h"
 
 namespace trocar::app {
 namespace {
@@ -56,16 +57,16 @@ void add_direction_options(CLI::App& app, const std::string& prefix, const std::
                            DirectionText& text) {
   app.add_option("--" + prefix + "delay", text.delay_ms, "one way" + which)
       ->type_name("MS")
-      ->check(from_to(0.0, kMostDelayMs));
+      ->check(command_line::from_to(0.0, kMostDelayMs));
   app.add_option("--" + prefix + "jitter", text.jitter_ms, "up to so much more, uniform" + which)
       ->type_name("MS")
-      ->check(from_to(0.0, kMostDelayMs));
+      ->check(command_line::from_to(0.0, kMostDelayMs));
   app.add_option("--" + prefix + "loss", text.loss_percent, "packets that are lost" + which)
       ->type_name("PERCENT")
-      ->check(from_to(0.0, kMostLossPercent));
+      ->check(command_line::from_to(0.0, kMostLossPercent));
   app.add_option("--" + prefix + "rate", text.rate_kbit, "kbit/s that get through" + which)
       ->type_name("KBIT")
-      ->check(from_to(8.0, 1e7));
+      ->check(command_line::from_to(8.0, 1e7));
 }
 
 void apply(const DirectionText& text, impair::Impairment& impairment) {
@@ -148,17 +149,17 @@ Result<std::optional<ImpairOptions>> parse_impair_command_line(int argc, char** 
   add_direction_options(app, "down-", ", to the client", down);
   app.add_option("--burst", burst, "mean length of runs of lost packets [each by itself]")
       ->type_name("N")
-      ->check(from_to(1.0, 1000.0));
+      ->check(command_line::from_to(1.0, 1000.0));
   app.add_option("--reorder", reorder, "datagrams that the next one overtakes")
       ->type_name("PERCENT")
-      ->check(from_to(0.0, 50.0));
+      ->check(command_line::from_to(0.0, 50.0));
   app.add_option("--duplicate", duplicate, "datagrams that arrive twice")
       ->type_name("PERCENT")
-      ->check(from_to(0.0, 100.0));
+      ->check(command_line::from_to(0.0, 100.0));
   app.add_option("--queue", queue_ms,
                  "longest backlog before --rate: then datagrams are dropped, and the stream waits")
       ->type_name("MS")
-      ->check(from_to(1.0, kMostDelayMs))
+      ->check(command_line::from_to(1.0, kMostDelayMs))
       ->capture_default_str();
   auto* block = app.add_option("--block-datagrams", blocked,
                                "none pass, after so many seconds, for so many [at once, for good]")
@@ -172,7 +173,7 @@ Result<std::optional<ImpairOptions>> parse_impair_command_line(int argc, char** 
       ->capture_default_str();
   app.add_option("--seconds", options.seconds, "end after so many [Ctrl-C]")
       ->type_name("N")
-      ->check(from_to(0.001, kMostSeconds));
+      ->check(command_line::from_to(0.001, kMostSeconds));
   app.add_option("--summary", options.summary_file,
                  "write what became of packets as JSON at the end")
       ->type_name("FILE");
@@ -180,15 +181,9 @@ Result<std::optional<ImpairOptions>> parse_impair_command_line(int argc, char** 
       ->type_name("FILE");
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {
-      app.exit(error);
-      return std::optional<ImpairOptions>();
-    }
-    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<ImpairOptions>();
   auto& proxy = options.proxy;
   if (auto s = parse_place("--listen", listen, proxy.listen_address, proxy.listen_port); !s)
     return s.error();

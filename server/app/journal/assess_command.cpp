@@ -13,9 +13,9 @@
 
 #include "common/base/exit_code.h"
 #include "common/base/log.h"
-#include "common/base/number_option.h"
 #include "common/base/printable.h"
 #include "common/base/text_file.h"
+#include "common/command_line/limits.h"
 #include "server/app/journal/outputs.h"
 #include "server/app/journal/program_name.h"
 #include "server/app/journal/recordings_of.h"
@@ -237,14 +237,14 @@ void add_options(CLI::App& command, AssessOptions& options) {
   command
       .add_option("--force-limit", options.force_limit_n,
                   "in N, where a stage has no limit of its own")
-      ->check(from_to(0.01, 100))
+      ->check(command_line::from_to(0.01, 100))
       ->capture_default_str();
   command.add_flag("--strain", options.measures_strain,
                    "how much tissue was strained too far: simulates the session again");
   command
       .add_option("--strain-limit", options.strain_limit,
                   "with --strain: the greatest principal strain that tissue bears")
-      ->check(from_to(0.01, 2))
+      ->check(command_line::from_to(0.01, 2))
       ->capture_default_str();
   command.add_flag("--pseudonyms", options.has_pseudonyms, "write Person 1, 2, ... for names");
   command.add_flag("--json", options.as_json, "print one JSON object");

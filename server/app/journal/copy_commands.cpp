@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "common/base/number_option.h"
 #include "common/base/result.h"
 #include "common/base/tick.h"
+#include "common/command_line/limits.h"
 #include "common/secure/signing.h"
 #include "server/app/journal/program_name.h"
 #include "server/session/recording/merge.h"
@@ -66,10 +66,10 @@ void add_options(CLI::App& command, TrimCommand& options) {
   command.add_option("NEW", options.to, "the file to write, which must not exist")->required();
   command
       .add_option("--from", options.from_s, "in s of the session; begins at the keyframe before")
-      ->check(from_to(0, kMostSeconds))
+      ->check(command_line::from_to(0, kMostSeconds))
       ->capture_default_str();
   command.add_option("--to", options.to_s, "in s of the session; the end without it")
-      ->check(from_to(0, kMostSeconds));
+      ->check(command_line::from_to(0, kMostSeconds));
 }
 
 int trim_recording(const TrimCommand& options) {

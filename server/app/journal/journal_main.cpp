@@ -15,6 +15,7 @@
 #include "common/base/timing.h"
 #include "common/base/unfinished_file.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
 #include "common/journal/mcap_repair.h"
 #include "common/journal/recording_end.h"
 #include "common/journal/session_journal.h"
@@ -338,12 +339,9 @@ int run(int argc, char** argv) {
                    "public Ed25519 key (PEM): before all else, whether its owner signed the "
                    "recording as it is")
       ->type_name("KEY");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return report(kProgram, parsed.error());
+  if (!*parsed) return static_cast<int>(ExitCode::Ok);
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (measure->parsed()) return assess(assess_options);
   if (cut->parsed()) return trim_recording(trim_command);

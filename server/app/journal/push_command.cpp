@@ -11,6 +11,7 @@
 
 #include "common/base/printable.h"
 #include "common/base/result.h"
+#include "common/command_line/limits.h"
 #include "common/journal/mcap_reader.h"
 #include "common/journal/recording_end.h"
 #include "server/app/journal/program_name.h"
@@ -90,7 +91,7 @@ void add_options(CLI::App& command, PushCommand& options) {
                   "of the storage [AWS_REGION, AWS_DEFAULT_REGION or us-east-1]")
       ->type_name("NAME");
   command.add_option("--part-mb", options.part_mb, "size of a part, in MiB")
-      ->check(CLI::Range(5u, 512u))
+      ->check(command_line::whole_from_to(5u, 512u))
       ->capture_default_str();
   command.add_flag("--plain-http", options.allows_plain,
                    "allow http:// to other machines, where recordings can be read on their way");

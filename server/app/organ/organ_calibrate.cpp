@@ -9,6 +9,7 @@
 #include "common/base/progress_line.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/command_line/limits.h"
 #include "common/plot/plot.h"
 #include "server/app/organ/organ_reduce.h"
 #include "server/app/organ/program_name.h"
@@ -157,7 +158,7 @@ void add_calibrate_command(CLI::App& app, CalibrateCommand& command) {
       ->type_name("N")
       ->capture_default_str();
   sub->add_option("--workers", command.settings.workers, "threads that share a tick's work")
-      ->check(CLI::Range(1u, kMaxWorkers))
+      ->check(command_line::whole_from_to(1u, kMaxWorkers))
       ->capture_default_str();
 }
 

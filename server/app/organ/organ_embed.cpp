@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "common/command_line/limits.h"
 #include "server/app/organ/program_name.h"
 #include "server/organs/embed/embed.h"
 #include "server/organs/formats/mesh_file.h"
@@ -82,13 +83,13 @@ void add_embed_options(CLI::App& app, EmbedCommand& command) {
                  "organ (as export writes .glb); auto: what it says, or those of FILE")
       ->type_name("FRAME")
       ->needs(embed)
-      ->check(CLI::IsMember({"auto", "file", "ras", "lps", "organ"}))
+      ->check(command_line::one_of({"auto", "file", "ras", "lps", "organ"}))
       ->capture_default_str();
   app.add_option("--embed-unit", command.unit,
                  "length unit of the fine surface: m, cm or mm [.glb: m, else that of FILE]")
       ->type_name("UNIT")
       ->needs(embed)
-      ->check(CLI::IsMember({"m", "cm", "mm"}));
+      ->check(command_line::one_of({"m", "cm", "mm"}));
 }
 
 Status embed_surface(const EmbedCommand& command, const EmbedPlace& place, organ::Organ& organ) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "common/command_line/limits.h"
 #include "server/app/organ/program_name.h"
 #include "server/lab/fit/csv_table.h"
 #include "server/lab/fit/identify_report.h"
@@ -81,7 +82,7 @@ void add_identify_command(CLI::App& app, IdentifyCommand& command) {
   identify
       ->add_option("--form", command.form,
                    "unsplit: Psi(I1) as in the live solver; isochoric: Psi(I1 J^(-2/3))")
-      ->check(CLI::IsMember({"unsplit", "isochoric"}))
+      ->check(command_line::one_of({"unsplit", "isochoric"}))
       ->capture_default_str();
   identify->add_option("--name", command.options.name, "of the material")
       ->type_name("NAME")

@@ -11,11 +11,12 @@
 #include <string_view>
 
 #include "common/base/log.h"
-#include "common/base/number_option.h"
 #include "common/base/printable.h"
 #include "common/base/program.h"
 #include "common/base/stdout_check.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
+#include "common/command_line/limits.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_edit.h"
 #include "server/app/organ/organ_embed.h"
@@ -48,6 +49,8 @@ constexpr std::string_view kFixSet = "set:";
 
 constexpr const char* kExamples = R"(
 Examples:
+  trocar-organ list
+      the built-in organs
   trocar-organ make liver
       the built-in liver with about 4,000 nodes, into liver.organ
   trocar-organ make liver --tets 100000 --out fine.organ
@@ -355,22 +358,22 @@ std::string range(int low, int high, int usual) {
   return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
 }
 
+void print_built_in_organs() {
+  for (const auto& each : catalogue::built_in_organs())
+    std::printf("%-14s %s\n", each.name, each.text);
+}
+
 void add_commands(CLI::App& app, Options& options) {
   auto* make = app.add_subcommand("make", "make a built-in organ, or that of a scenario");
   make->add_option("NAME", options.made_name,
-                   "liver (human_liver_nava2008), elastic-liver (neo-Hookean), stomach, lattice "
-                   "(Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
-                   "0.4 cm), chest (wall and heart, the size of Nakao's) or pegs (a board with "
-                   "three rings to move); or a scenario's .toml file: its "
-                   "organ with its materials, regions and held nodes")
+                   "a built-in organ, which list shows; or a scenario's .toml file: its organ with "
+                   "its materials, regions and held nodes")
       ->required()
       ->check([](const std::string& name) -> std::string {
-        static constexpr std::array<std::string_view, 7> kNames{
-            "liver", "elastic-liver", "stomach", "lattice", "plate", "chest", "pegs"};
-        if (name.ends_with(".toml") || std::ranges::find(kNames, name) != kNames.end()) return {};
-        return name +
-               ": is neither liver, elastic-liver, stomach, lattice, plate, chest or pegs nor "
-               "a .toml file of a scenario";
+        if (name.ends_with(".toml")) return {};
+        for (const auto& each : catalogue::built_in_organs())
+          if (name == each.name) return {};
+        return catalogue::no_built_in(name);
       });
   make->add_option("--tets", options.tets,
                    "how many tets, met within 5 %: liver " +
@@ -381,6 +384,8 @@ void add_commands(CLI::App& app, Options& options) {
                              catalogue::kDefaultStomachTets))
       ->type_name("N");
   make->add_option("--out", options.out, "file to write [NAME.organ]")->type_name("FILE");
+
+  app.add_subcommand("list", "list the built-in organs");
 
   auto* import =
       app.add_subcommand("import", "turn a mesh, a closed surface or a label map into an organ");
@@ -423,15 +428,15 @@ void add_commands(CLI::App& app, Options& options) {
 
   import->add_option("--law", options.law, "springs, tensor-mass or neo-hookean [springs]")
       ->type_name("LAW")
-      ->check(CLI::IsMember({"springs", "tensor-mass", "neo-hookean"}));
+      ->check(command_line::one_of({"springs", "tensor-mass", "neo-hookean"}));
   import->add_option("--young-modulus", options.young_modulus_pa, "of its tissue, Pa [4000]")
       ->type_name("E")
-      ->check(from_to(1, 1e12));
+      ->check(command_line::from_to(1, 1e12));
   import
       ->add_option("--poisson-ratio", options.poisson_ratio,
                    "of tensor-mass and neo-hookean tissue, 0 to 0.4999 [0.45]")
       ->type_name("NU")
-      ->check(from_to(0, 0.4999));
+      ->check(command_line::from_to(0, 0.4999));
 
   auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
   inspect
@@ -506,24 +511,23 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   add_commands(app, options);
-  try {
-    app.parse(argc, argv);
-    // CLI11 writes false where nobody has said anything.
-    const auto says = [&app](const char* command) {
-      return app.got_subcommand(command) &&
-             app.get_subcommand(command)->count("--averaged-strain") > 0;
-    };
-    options.unit_is_said =
-        app.got_subcommand("import") && app.get_subcommand("import")->count("--unit") > 0;
-    if (!says("make") && !says("import")) options.has_averaged_strain.reset();
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return report(kProgram, parsed.error());
+  if (!*parsed) return static_cast<int>(ExitCode::Ok);
+  // CLI11 writes false where nobody has said anything.
+  const auto says = [&app](const char* command) {
+    return app.got_subcommand(command) &&
+           app.get_subcommand(command)->count("--averaged-strain") > 0;
+  };
+  options.unit_is_said =
+      app.got_subcommand("import") && app.get_subcommand("import")->count("--unit") > 0;
+  if (!says("make") && !says("import")) options.has_averaged_strain.reset();
   if (const auto set = log::configure(kProgram, options.log_level); !set)
     return report(kProgram, set.error());
   Status status;
-  if (app.got_subcommand("make"))
+  if (app.got_subcommand("list"))
+    print_built_in_organs();
+  else if (app.got_subcommand("make"))
     status = run_make(options);
   else if (app.got_subcommand("import"))
     status = run_import(options);

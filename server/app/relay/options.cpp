@@ -2,9 +2,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "common/base/number_option.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
+#include "common/command_line/limits.h"
 #include "server/app/config/config_file.h"
 #include "server/app/config/log_options.h"
 #include "server/app/config/nats_options.h"
@@ -104,7 +104,7 @@ CommandLine::CommandLine() {
           ->capture_default_str();
   app_.add_option("--port", port_, "the same for any network: as --listen 0.0.0.0:PORT")
       ->type_name("PORT")
-      ->check(from_to(0, 65'535));
+      ->check(command_line::from_to(0, 65'535));
   app_.add_option("--name", options_.name, "how the server lists it [Relay and its port]")
       ->type_name("NAME")
       ->check(short_name());
@@ -116,14 +116,14 @@ CommandLine::CommandLine() {
                 "frames over the TCP stream alone, where lost packets hold up the picture");
   app_.add_option("--max-watchers", options_.most_watchers, "people who watch through it")
       ->type_name("N")
-      ->check(from_to(1, 10'000))
+      ->check(command_line::from_to(1, 10'000))
       ->capture_default_str();
   app_.add_option("--metrics", metrics_,
                   "where monitoring reads /healthz, /readyz and /metrics, without TLS [nowhere]")
       ->type_name("ADDR:PORT");
   app_.add_option("--seconds", options_.seconds, "end after this many seconds [with the session]")
       ->type_name("N")
-      ->check(from_to(0, 1e9));
+      ->check(command_line::from_to(0, 1e9));
   app_.add_option("--ready-file", options_.ready_file,
                   "write the port to this file when there is a picture to show")
       ->type_name("FILE");

@@ -7,6 +7,7 @@
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/base/workers.h"
+#include "common/command_line/limits.h"
 #include "common/discovery/notice.h"
 #include "server/app/config/config_file.h"
 #include "server/app/config/log_options.h"
@@ -50,17 +51,6 @@ std::string version_text() {
          ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
 }
 
-// A number, and not one that no limit refuses: CLI::Range lets "nan" through.
-CLI::Validator between(double least, double most) {
-  return {[=](std::string& text) -> std::string {
-            double value = 0;
-            if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most)
-              return {};
-            return fmt::format("is {}, allowed are {} to {}", text, least, most);
-          },
-          fmt::format("in {} to {}", least, most)};
-}
-
 CLI::Validator printable_name() {
   return {[](std::string& text) -> std::string {
             if (is_printable(text) && !text.empty() && text.size() <= discovery::kMostNameBytes)
@@ -75,11 +65,11 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
   auto* access = app.add_option_group("Access", "who may join");
   access->add_option("--code-hours", options.code_hours, "how long the join codes are good")
       ->type_name("H")
-      ->check(between(0.01, 8760))
+      ->check(command_line::from_to(0.01, 8760))
       ->capture_default_str();
   access->add_option("--code-uses", options.code_uses, "how often each may be used, 0: any number")
       ->type_name("N")
-      ->check(CLI::Range(0, 1'000'000))
+      ->check(command_line::whole_from_to(0, 1'000'000))
       ->capture_default_str();
   access->add_flag("--keep-codes", options.keeps_codes,
                    "codes stay good after the end, for the next start with this option");
@@ -96,12 +86,12 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
       ->add_option("--new-code", options.new_code,
                    "make one more code of a role for the server that runs at --listen, and exit")
       ->type_name("ROLE")
-      ->check(CLI::IsMember({"surgeon", "assistant", "instructor", "observer"}));
+      ->check(command_line::one_of({"surgeon", "assistant", "instructor", "observer"}));
   access
       ->add_option("--return-seconds", options.return_seconds,
                    "how long somebody's seat is kept when the connection breaks, 0: not")
       ->type_name("N")
-      ->check(CLI::Range(0, 3600))
+      ->check(command_line::whole_from_to(0, 3600))
       ->capture_default_str();
   access
       ->add_option("--audit", options.audit_file,
@@ -127,50 +117,50 @@ void add_limit_options(CLI::App& app, LimitOptions& options) {
   auto* limits = app.add_option_group("Limits", "how much people and strangers may take");
   limits->add_option("--max-hands", options.places.hands, "people with tools: surgeons, assistants")
       ->type_name("N")
-      ->check(CLI::Range(1, kMaxHands))
+      ->check(command_line::whole_from_to(1, kMaxHands))
       ->capture_default_str();
   limits->add_option("--max-watchers", options.places.watchers, "instructors and observers")
       ->type_name("N")
-      ->check(CLI::Range(0, kMaxWatchers))
+      ->check(command_line::whole_from_to(0, kMaxWatchers))
       ->capture_default_str();
   limits->add_option("--max-tools", options.places.tools, "tools of one person")
       ->type_name("N")
-      ->check(CLI::Range(1, kToolsPerHand))
+      ->check(command_line::whole_from_to(1, kToolsPerHand))
       ->capture_default_str();
   limits
       ->add_option("--longest-edge", options.places.longest_edge_mm,
                    "mm of a blade's edge; a longer one is refused")
       ->type_name("MM")
-      ->check(CLI::Range(1, 200))
+      ->check(command_line::whole_from_to(1, 200))
       ->capture_default_str();
   limits
       ->add_option("--max-messages", options.messages_per_second,
                    "messages of one client per second, or its session ends")
       ->type_name("N")
-      ->check(CLI::Range(100u, 20'000u))
+      ->check(command_line::whole_from_to(100u, 20'000u))
       ->capture_default_str();
   limits
       ->add_option("--max-kilobytes", options.kilobytes_per_second,
                    "kB of one client per second, or its session ends")
       ->type_name("N")
-      ->check(CLI::Range(50u, 10'000u))
+      ->check(command_line::whole_from_to(50u, 10'000u))
       ->capture_default_str();
   limits
       ->add_option("--max-message-bytes", options.message_bytes, "bytes of one message of a client")
       ->type_name("N")
-      ->check(CLI::Range(1024u, wire::kMaxUpstreamBytes))
+      ->check(command_line::whole_from_to(1024u, wire::kMaxUpstreamBytes))
       ->capture_default_str();
   limits
       ->add_option("--max-newcomers", options.newcomers,
                    "connections that have not said who they are; the oldest makes room")
       ->type_name("N")
-      ->check(CLI::Range(4, 1000))
+      ->check(command_line::whole_from_to(4, 1000))
       ->capture_default_str();
   limits
       ->add_option("--max-newcomers-per-address", options.newcomers_per_address,
                    "of these from one address")
       ->type_name("N")
-      ->check(CLI::Range(4, 1000))
+      ->check(command_line::whole_from_to(4, 1000))
       ->capture_default_str();
 }
 
@@ -195,7 +185,7 @@ void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions
   research
       ->add_option("--budget", options.budget_ms, "of each millisecond, how much the tick may take")
       ->type_name("MS")
-      ->check(between(0.05, 1))
+      ->check(command_line::from_to(0.05, 1))
       ->capture_default_str();
   more.depth =
       research->add_option("--depth", options.decisions.depth_limit,
@@ -243,7 +233,7 @@ class CommandLine {
   const CLI::Option* organ_ = nullptr;
   CLI::App app_{
       "Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
-      "people with tools and 100 who watch.",
+      "people with tools and 100 who watch, or more with --max-watchers.",
       "trocar-server"};
 };
 
@@ -307,24 +297,24 @@ void CommandLine::add_session_options() {
       ->type_name("FILE");
   app_.add_option("--seconds", options_.seconds, "end after this many simulated seconds")
       ->type_name("N")
-      ->check(between(0, 1e9));
+      ->check(command_line::from_to(0, 1e9));
   app_.add_option("--wait-for", options_.awaited_people,
                   "let time stand still after the first frame until so many people are there")
       ->type_name("N")
-      ->check(CLI::Range(0, kMaxHands + kMaxWatchers))
+      ->check(command_line::whole_from_to(0, kMaxHands + kMaxWatchers))
       ->capture_default_str();
   app_.add_option("--pace", options_.pace,
                   "let time go up to so many times as fast while all hands follow, for sessions of "
                   "scripts; ticks then do all that is asked for, as with --fixed-decisions")
       ->type_name("N")
-      ->check(between(1, kMostPace))
+      ->check(command_line::from_to(1, kMostPace))
       ->capture_default_str();
   app_.add_option("--summary", options_.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
   app_.add_option("--workers", options_.workers,
                   "threads that share a tick's work; 0: as many as help, now one and now more")
       ->type_name("N")
-      ->check(CLI::Range(0u, kMaxWorkers))
+      ->check(command_line::whole_from_to(0u, kMaxWorkers))
       ->capture_default_str()
       ->group("Speed");
   add_log_options(app_, options_.log_level, options_.log_format);

@@ -6,7 +6,7 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "common/base/number_option.h"
+#include "common/command_line/limits.h"
 #include "server/app/sim/program_name.h"
 #include "server/lab/finite_elements/scenario_solve.h"
 #include "server/lab/scenario/field_files.h"
@@ -142,7 +142,7 @@ void add_fem_options(CLI::App& app, FemCommand& command) {
   const char* group = "With --solver fem";
   app.add_option("--elements", command.elements, "linear or quadratic tetrahedra [quadratic]")
       ->type_name("ORDER")
-      ->check(CLI::IsMember({"linear", "quadratic"}))
+      ->check(command_line::one_of({"linear", "quadratic"}))
       ->group(group);
   app.add_option(
          "--material", command.material,
@@ -152,16 +152,16 @@ void add_fem_options(CLI::App& app, FemCommand& command) {
       ->group(group);
   app.add_option("--bulk-ratio", command.bulk_ratio, "its bulk modulus over C10 [its own]")
       ->type_name("RATIO")
-      ->check(from_to(2, 1e6))
+      ->check(command_line::from_to(2, 1e6))
       ->group(group);
   app.add_option("--response", command.response,
                  "static runs: instantaneous, or equilibrium after all relaxation [instantaneous]")
       ->type_name("RESPONSE")
-      ->check(CLI::IsMember({"instantaneous", "equilibrium"}))
+      ->check(command_line::one_of({"instantaneous", "equilibrium"}))
       ->group(group);
   app.add_option("--step-ms", command.step_ms, "dynamic runs: step of time [1]")
       ->type_name("MS")
-      ->check(from_to(0.001, 1e6))
+      ->check(command_line::from_to(0.001, 1e6))
       ->group(group);
   app.add_option("--resume", command.resume,
                  "go on from this state of the same run; every run leaves one, fem.state in its "

@@ -17,6 +17,8 @@
 #include "common/base/stdout_check.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/command_line/command_line.h"
+#include "common/command_line/limits.h"
 #include "server/app/sim/program_name.h"
 #include "server/app/sim/sim_fem.h"
 #include "server/app/sim/sim_hands.h"
@@ -330,14 +332,14 @@ int run(int argc, char** argv) {
                  "live: the sweeps of a session; full: every step to the tolerance in [run]; fem: "
                  "the off-line finite elements, for reference")
       ->type_name("SOLVER")
-      ->check(CLI::IsMember({"live", "full", "fem"}))
+      ->check(command_line::one_of({"live", "full", "fem"}))
       ->capture_default_str();
   app.add_flag("--plot", options.is_plotted,
                "also draw what each probe saw: probe_<name>.svg over time, and force_<name>.svg, "
                "force against displacement, of what loads the tissue and is probed");
   app.add_option("--threads", options.threads, "of the solver; results are the same")
       ->type_name("N")
-      ->check(CLI::Range(1, 64))
+      ->check(command_line::whole_from_to(1, 64))
       ->capture_default_str();
   app.add_option("--journal", options.journal,
                  "also record the run as a session is recorded, in this file (.mcap)")
@@ -346,12 +348,9 @@ int run(int argc, char** argv) {
   add_fem_options(app, options.fem);
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
-  }
+  const auto parsed = command_line::parse_command_line(app, argc, argv);
+  if (!parsed) return report(kProgram, parsed.error());
+  if (!*parsed) return static_cast<int>(ExitCode::Ok);
   if (const auto set = log::configure(kProgram, options.log_level); !set)
     return report(kProgram, set.error());
   const auto status = run_scenario(options);

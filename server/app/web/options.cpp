@@ -3,8 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 
-#include "common/base/number_option.h"
 #include "common/base/version.h"
+#include "common/command_line/limits.h"
 #include "common/secure/loopback.h"
 #include "server/app/config/config_file.h"
 #include "server/app/config/log_options.h"
@@ -100,7 +100,7 @@ CommandLine::CommandLine() {
       ->type_name("ADDR:PORT");
   app_.add_option("--seconds", options_.seconds, "end after this many seconds [Ctrl-C]")
       ->type_name("N")
-      ->check(from_to(0, 1e9));
+      ->check(command_line::from_to(0, 1e9));
   app_.add_option("--ready-file", options_.ready_file, "write the port to this file when listening")
       ->type_name("FILE");
   add_log_options(app_, options_.log_level, options_.log_format);
@@ -136,19 +136,19 @@ void CommandLine::add_limit_options() {
   auto* limits = app_.add_option_group("Limits", "how much strangers may take");
   limits->add_option("--max-connections", options_.most_connections, "connections of browsers")
       ->type_name("N")
-      ->check(CLI::Range(4, 10'000))
+      ->check(command_line::whole_from_to(4, 10'000))
       ->capture_default_str();
   limits
       ->add_option("--max-connections-per-address", options_.most_per_address,
                    "of these from one address")
       ->type_name("N")
-      ->check(CLI::Range(4, 10'000))
+      ->check(command_line::whole_from_to(4, 10'000))
       ->capture_default_str();
   limits
       ->add_option("--check-limit", options_.check_limit_s,
                    "seconds after which the check of a recording is given up")
       ->type_name("N")
-      ->check(CLI::Range(1, 86'400))
+      ->check(command_line::whole_from_to(1, 86'400))
       ->capture_default_str();
 }
 

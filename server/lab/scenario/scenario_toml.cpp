@@ -116,7 +116,10 @@ void read_scenario(tool::Document& document, tool::TableReader& root, Scenario& 
     return true;
   };
   if (!with("organ", [&](tool::TableReader& r) { scenario.organ = read_organ(r); }))
-    root.fail("organ", "is missing, add [organ] with its source");
+    root.fail("organ", root.tables("tool").empty()
+                           ? "is missing, add [organ] with its source"
+                           : "is missing: if this is a script of hands and no scenario, give it to "
+                             "trocar-client --script; else add [organ] with its source");
   with("material", [&](tool::TableReader& r) { scenario.material = read_material(r); });
   scenario.node_rules = read_node_rules(document, root);
   scenario.regions = read_regions(document, root);

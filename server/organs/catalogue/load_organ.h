@@ -2,6 +2,7 @@
 
 // One place where every program gets its organ from.
 
+#include <span>
 #include <string>
 
 #include "common/base/result.h"
@@ -10,7 +11,19 @@
 
 namespace trocar::catalogue {
 
-// "liver" (measured), "elastic-liver", "lattice", "plate", "stomach", "chest", "pegs", or the path
+struct BuiltIn {
+  const char* name;
+  const char* text;  // what it is, in a few words
+  Result<organ::Organ> (*make)();
+};
+
+// All of them; who asks for one by name needs no file.
+std::span<const BuiltIn> built_in_organs();
+
+// Says that no built-in organ has this name, which was probably meant, and what to do.
+std::string no_built_in(const std::string& name);
+
+// The name of a built-in organ, or the path
 // of an .organ file or of a mesh (import_organ.h). A mesh is imported with the default options, and
 // its warnings are logged.
 Result<organ::Organ> load_organ(const std::string& spec);
