@@ -21,6 +21,7 @@
 #include "common/base/log.h"
 #include "common/base/signals.h"
 #include "common/base/timing.h"
+#include "common/lesson/lesson_texts.h"
 #include "common/secure/link_file.h"
 #include "common/secure/loopback.h"
 #include "common/tool/script.h"
@@ -52,6 +53,11 @@ class Run {
   }
 
   Result<ExitCode> run();
+  void offer_ways_on() { practises_ = true; }
+  // Returns what the person wants who has left a lesson.
+  std::optional<ui::AfterLesson> after_lesson() const {
+    return picture_ ? picture_->lesson().wish : std::nullopt;
+  }
 
  private:
   Status step(std::uint64_t now_ns);
@@ -81,6 +87,7 @@ class Run {
   std::string exit_reason_;
   replica::TimeDistribution round_trip_, surface_age_, hand_to_visible_, cut_to_visible_;
   wire::RecordingStatus recording_told_ = wire::RecordingStatus::Unknown;
+  bool practises_ = false;  // alone
   std::uint64_t last_change_us_ = 0;
   double last_round_trip_seconds_ = 0;
 };
@@ -228,6 +235,7 @@ Result<ExitCode> Run::run() {
     auto picture = Picture::make(options_, "Trocar: " + source_.name());
     if (!picture) return picture.error();
     picture_ = std::move(*picture);
+    if (practises_) picture_->lesson().offers_ways_on = true;
     if (pair_ != nullptr) picture_->stand_beside(options_, *pair_, second_);
     // Nobody else needs the processors while a recording plays; who asks for a rate gets it.
     if (picture_->is_software() && source_.playback() == nullptr &&
@@ -327,8 +335,12 @@ void install_signal_handlers() {
 }
 
 Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,
-                                 Hands& hands) {
-  return Run(options, source, hands).run();
+                                 Hands& hands, std::optional<ui::AfterLesson>* after_lesson) {
+  Run run(options, source, hands);
+  if (after_lesson != nullptr) run.offer_ways_on();
+  auto ran = run.run();
+  if (after_lesson != nullptr) *after_lesson = run.after_lesson();
+  return ran;
 }
 
 Result<ExitCode> run_pair(const ClientOptions& options, replay::PairedSource& pair) {
@@ -390,7 +402,8 @@ Status check_end(const ClientOptions& options) {
   return {};
 }
 
-Result<ExitCode> run_chosen(const ClientOptions& options) {
+Result<ExitCode> run_chosen(const ClientOptions& options,
+                            std::optional<ui::AfterLesson>* after_lesson) {
   Hands hands;
   if (!options.series_folder.empty()) {
     if (const auto written = write_picture_series(options); !written) return written.error();
@@ -431,7 +444,18 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
   connection.tools = hands.shapes();
   connection.hands = hands.line();
   net::NetSource source(std::move(connection));
-  return run_with_source(options, source, hands);
+  return run_with_source(options, source, hands, after_lesson);
+}
+
+// The lesson that a person wants who has left the one that `settings` gave; nothing: none.
+std::optional<std::string> wanted_lesson(const OwnServer::Settings& settings,
+                                         ui::AfterLesson after_lesson) {
+  if (after_lesson == ui::AfterLesson::Leave) return std::nullopt;
+  if (after_lesson == ui::AfterLesson::Repeat) return settings.lesson;
+  const auto all = lesson::lesson_texts();
+  auto next = std::ranges::find(all, settings.lesson, &lesson::LessonText::name);
+  if (next != all.end()) ++next;
+  return next == all.end() ? all.front().name : next->name;
 }
 
 }  // namespace
@@ -439,17 +463,23 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
 // Who hosts a lesson comes back to it from a session, and ends it there.
 Result<ExitCode> run_client(const ClientOptions& options) {
   if (const auto writable = check_end(options); !writable) return writable.error();
-  if (!wants_start_screen(options)) return run_chosen(options);
+  if (!wants_start_screen(options)) return run_chosen(options, nullptr);
   ClientOptions chosen = options;
   std::unique_ptr<OwnServer> own;
+  std::optional<std::string> lesson;  // to practise at once
   for (std::string message;;) {
-    auto choice = choose_session(chosen, message, own);
+    auto choice = choose_session(chosen, message, own, lesson);
     if (!choice) return choice.error();
     if (!*choice) return ExitCode::Ok;
     chosen = std::move(**choice);
-    auto ran = run_chosen(chosen);
+    std::optional<ui::AfterLesson> after_lesson;
+    const bool practises =
+        own && !own->settings().is_for_network && !own->settings().lesson.empty();
+    auto ran = run_chosen(chosen, practises ? &after_lesson : nullptr);
+    lesson.reset();
+    if (own && after_lesson) lesson = wanted_lesson(own->settings(), *after_lesson);
     if (own && !own->settings().is_for_network) own.reset();
-    if (is_stop_requested() || (ran && !own)) return ran;
+    if (is_stop_requested() || (ran && !own && !after_lesson)) return ran;
     message = ran ? "" : ran.error().message;
     if (!ran) log::warn("{}", message);
   }

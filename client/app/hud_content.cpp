@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cstdio>
 
+#include <fmt/format.h>
+
 #include "client/ui/away_text.h"
 #include "client/ui/banner_text.h"
 #include "client/ui/rate_text.h"
+#include "common/lesson/advice.h"
 #include "common/tool/instrument.h"
 
 namespace trocar::app {
@@ -133,10 +136,8 @@ void add_connection(const replica::SessionSource& source, bool has_organ, ui::Hu
 
 void add_figures(const replica::Replica& replica, const replica::SessionSource& source,
                  std::uint64_t now_ns, ui::HudModel& model) {
-  if (!replica.topology().rest_positions.empty())
-    model.organ = replica.topology().organ_name + ", " +
-                  ui::with_thousands(replica.topology().rest_positions.size()) +
-                  " surface vertices";
+  if (!replica.topology().rest_positions.empty()) model.organ = replica.topology().organ_name;
+  model.vertices = replica.topology().rest_positions.size();
   if (const auto* newest = replica.newest()) {
     model.figures = figures_of(replica);
     model.session_seconds = static_cast<double>(newest->tick) * 1e-3;
@@ -165,9 +166,10 @@ void add_own_forces(const replica::Replica& replica, const Pane& pane, ui::HudMo
   for (const replica::Tool& tool : pane.surface().tools()) count += tool.slot.owner() == own;
   for (const replica::Tool& tool : pane.surface().tools()) {
     if (tool.slot.owner() != own) continue;
-    const std::string number = count > 1 ? " " + std::to_string(tool.slot.number() + 1) : "";
+    const std::string hand =
+        count > 1 ? tool.slot.number() == 0 ? "right hand" : "left hand" : "hand";
     model.own_forces.push_back(
-        {"force on your tool" + number, shape::colour_of_slot(own.value), length(tool.force_n)});
+        {"force on your " + hand, shape::colour_of_slot(own.value), length(tool.force_n)});
   }
   if (count == 0) return;
   const auto forces = pane.forces().forces(own);
@@ -223,8 +225,49 @@ void add_timeline(const replica::PlaybackControl& playback, bool is_measuring,
                                    is_measuring};
 }
 
+namespace {
+
+// Looks for what became of one's own last answer in this stage. With a wrong one comes the hint,
+// which the server tells later, of a lesson that the programs bring.
+void add_verdict(const replica::Replica& replica, ui::HudLesson& shown) {
+  const auto& lesson = *replica.lesson();
+  const auto* own = replica.find_participant(replica.own_slot());
+  if (own == nullptr || lesson.goal != replica::LessonView::Goal::Find) return;
+  const std::string head = own->name + " says that it is here: ";
+  for (const auto& notice : replica.notices()) {
+    if (notice.tick < lesson.begin_tick || !notice.is_for_all || !notice.text.starts_with(head))
+      continue;
+    shown.is_right = !notice.is_refused;
+    shown.verdict = shown.is_right ? "That is right." : "It is not there.";
+  }
+  if (shown.verdict.empty() || shown.is_right || !shown.hint.empty()) return;
+  const auto* known = lesson::find_by_title(lesson.title);
+  const auto* stage = known != nullptr ? lesson::find_stage(*known, lesson.name) : nullptr;
+  if (stage != nullptr) shown.hint = stage->hint;
+}
+
+void add_outcome(const replica::LessonView& lesson, std::optional<float> best_before,
+                 ui::HudLesson& shown) {
+  const bool has_passed = static_cast<double>(lesson.points) >= lesson::kPassPoints;
+  shown.outcome =
+      fmt::format("{}: {:.0f} points are needed.",
+                  has_passed ? "You have passed" : "Not passed yet", lesson::kPassPoints);
+  if (best_before)
+    shown.outcome += lesson.points > *best_before
+                         ? fmt::format(" Your best so far; it was {:.0f}.", *best_before)
+                         : fmt::format(" Your best so far is {:.0f}.", *best_before);
+  const auto* known = lesson::find_by_title(lesson.title);
+  if (known == nullptr) return;
+  std::vector<lesson::ToldResult> results;
+  for (const auto& result : lesson.results)
+    results.push_back({result.name, result.is_reached, result.lines});
+  shown.advice = lesson::advice_on(*known, results);
+}
+
+}  // namespace
+
 void add_lesson(const replica::Replica& replica, const render::ImageTexture& image,
-                const Onlooker& onlooker, ui::HudModel& model) {
+                const Onlooker& onlooker, std::optional<float> best_before, ui::HudModel& model) {
   const auto& lesson = replica.lesson();
   if (!lesson) return;
   ui::HudLesson shown{.title = lesson->title,
@@ -239,6 +282,8 @@ void add_lesson(const replica::Replica& replica, const render::ImageTexture& ima
                       .is_too_strong = lesson->is_too_strong,
                       .is_over = lesson->is_over,
                       .points = lesson->points};
+  // An answer reaches it at once, or not.
+  if (lesson->goal == replica::LessonView::Goal::Find) shown.progress.reset();
   if (onlooker.is_replay) {
     const Tick now = replica.newest() != nullptr ? replica.newest()->tick : 0;
     shown.progress.reset();
@@ -248,6 +293,9 @@ void add_lesson(const replica::Replica& replica, const render::ImageTexture& ima
     shown.can_answer =
         lesson->goal == replica::LessonView::Goal::Find && replica.own_slot().has_tools();
     shown.can_lead = onlooker.role == replica::Role::Instructor;
+    shown.can_go_on = onlooker.practises;
+    add_verdict(replica, shown);
+    if (replica.own_slot().has_tools() && lesson->is_over) add_outcome(*lesson, best_before, shown);
   }
   if (image.name() != 0) {
     shown.picture = image.name();
@@ -270,9 +318,7 @@ void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& mod
   if (pace.is_paused) {
     model.pace_text = (pace.by.empty() ? "Somebody" : pace.by) + " has paused the session.";
   } else if (pace.rate < 1) {
-    char text[48];
-    std::snprintf(text, sizeof text, "Time goes at %.0f %%.", 100 * static_cast<double>(pace.rate));
-    model.pace_text = text;
+    model.pace_text = ui::slow_text(pace.rate);
   }
   if (!model.can_mark || !replica.has_pace()) return;
   ui::HudConduct conduct{.is_paused = pace.is_paused,

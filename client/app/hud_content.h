@@ -16,6 +16,7 @@ namespace trocar::app {
 struct Onlooker {
   replica::Role role = replica::Role::Observer;  // before the server has said one
   bool is_replay = false;
+  bool practises = false;  // alone, in a session that this client has started
 };
 
 std::vector<ui::HudParticipant> participants_of(const replica::Replica& replica, const Pane& pane,
@@ -35,8 +36,9 @@ void add_lent_view(const replica::Replica& replica, const Pane& pane, bool is_re
 void add_messages(const replica::Replica& replica, std::uint64_t now_ns, ui::HudModel& model);
 void add_timeline(const replica::PlaybackControl& playback, bool is_measuring, ui::HudModel& model);
 // `image` is the picture of the stage, if it has one.
+// `best_before`: points of the best attempt before this one.
 void add_lesson(const replica::Replica& replica, const render::ImageTexture& image,
-                const Onlooker& onlooker, ui::HudModel& model);
+                const Onlooker& onlooker, std::optional<float> best_before, ui::HudModel& model);
 void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model);
 
 }  // namespace trocar::app

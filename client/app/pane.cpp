@@ -190,7 +190,7 @@ ui::HudRuler Pane::ruler() const {
   return ruler;
 }
 
-std::vector<ui::HudLabel> Pane::labels(const replica::Replica& replica) const {
+std::vector<ui::HudLabel> Pane::labels(const replica::Replica& replica, bool shows_own) const {
   std::vector<ui::HudLabel> labels;
   const auto left = static_cast<float>(region_.left);
   for (const render::SceneTool& tool : scene_.tools) {
@@ -198,6 +198,7 @@ std::vector<ui::HudLabel> Pane::labels(const replica::Replica& replica) const {
     const Vec3f collar = tool.world_from_tool.apply({0, 0, tool.shape.radius_m * 7});
     const auto at = camera_.project(collar, size());
     if (owner == nullptr || !at) continue;
+    if (!shows_own && owner->slot == replica.own_slot()) continue;
     char force[32] = "";
     if (length(tool.force_n) >= render::kMinArrowNewton)
       std::snprintf(force, sizeof force, "  %.2f N", static_cast<double>(length(tool.force_n)));

@@ -56,7 +56,7 @@ class Pane {
   const replica::MeasuredPlaces& measured() const { return measured_; }
   // These stand in pixels of the window.
   ui::HudRuler ruler() const;
-  std::vector<ui::HudLabel> labels(const replica::Replica& replica) const;
+  std::vector<ui::HudLabel> labels(const replica::Replica& replica, bool shows_own) const;
 
   render::Size size() const { return region_.size; }
   render::OrbitCamera& camera() { return camera_; }

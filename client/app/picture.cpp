@@ -106,7 +106,7 @@ void Picture::add_felt_hands(const Hands& hands, ui::HudModel& model) const {
 ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::SessionSource& source,
                                 Hands& hands, std::uint64_t now_ns) const {
   ui::HudModel model;
-  const Onlooker onlooker{role_, source.playback() != nullptr};
+  const Onlooker onlooker{role_, source.playback() != nullptr, lesson_.offers_ways_on};
   add_person(replica, onlooker, follows_view_, model);
   add_connection(source, pane_.surface().is_valid(), model);
   add_figures(replica, source, now_ns, model);
@@ -118,7 +118,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.can_mark = !onlooker.is_replay && role_ == replica::Role::Instructor;
   model.has_own_tool = hands.mouse_tool() != nullptr;
   model.tray = tray_of(hands.choice());
-  add_lesson(replica, lesson_image_.texture, onlooker, model);
+  add_lesson(replica, lesson_.texture, onlooker, lesson_.best.before(), model);
   add_pace(replica, onlooker.is_replay, model);
 
   model.shows_regions = overlays_.regions;
@@ -130,7 +130,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.participants = participants_of(replica, pane_, onlooker.is_replay);
   if (!onlooker.is_replay) add_own_forces(replica, pane_, model);
   add_felt_hands(hands, model);
-  model.labels = pane_.labels(replica);
+  model.labels = pane_.labels(replica, onlooker.is_replay || overlays_.rate);
   add_measure(model);
   add_halves(replica, model);
   if (!beside_) add_messages(replica, now_ns, model);
@@ -140,7 +140,9 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
 
 void Picture::act(const ui::HudActions& actions, const replica::Replica& replica,
                   replica::SessionSource& source) {
-  if (actions.toggle_help) {
+  // Esc leaves one thing at a time.
+  const bool leaves_help = actions.leave && shows_help_;
+  if (actions.toggle_help || leaves_help) {
     shows_help_ = !shows_help_;
     help_until_ns_ = 0;
   }
@@ -150,7 +152,8 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_rate) overlays_.rate = !overlays_.rate;
   if (actions.reset_camera) pane_.frame_camera(replica, view_);
   if (actions.screenshot) wants_screenshot_ = true;
-  if (actions.toggle_measure || (actions.end_measure && is_measuring_)) toggle_measure();
+  if (actions.leave && !leaves_help && !is_measuring_) leave_lent_views();
+  if (actions.toggle_measure || (actions.leave && !leaves_help && is_measuring_)) toggle_measure();
   if (actions.next_lent_view) pane_.lent().next(pane_.scene().tools, source.playback() != nullptr);
   if (actions.toggle_follow) follows_view_ = !follows_view_;
   // A wish that cannot be sent is lost: whoever presses the key asks again.
@@ -207,7 +210,7 @@ void Picture::move_mouse_tool(const replica::Replica& replica, Hands& hands,
   mouse->update(input, view, pane_.surface().positions(), replica.topology().triangles, seconds);
 }
 
-void Picture::LessonImage::load(const replica::Replica& replica) {
+void LessonPart::load(const replica::Replica& replica) {
   static const std::string kNone;
   const auto& wanted =
       replica.lesson() && !replica.lesson()->is_over ? replica.lesson()->picture : kNone;
@@ -248,9 +251,11 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   if (pane_.surface().is_valid()) move_mouse_tool(replica, hands, input, seconds);
   pane_.make_scene(replica, hands, {overlays_, seconds, source.playback() != nullptr});
   make_beside_scene(seconds);
-  lesson_image_.load(replica);
+  lesson_.load(replica);
   const auto actions = hud_.draw(hud_model(replica, source, hands, now_ns));
   act(actions, replica, source);
+  if (source.playback() == nullptr) lesson_.best.note(replica);
+  if (actions.after_lesson) lesson_.wish = actions.after_lesson;
   if (actions.take_instrument) hands.take(*actions.take_instrument, source);
   if (actions.answer)
     replica::send_lesson_wish(source, replica::LessonWish::Answer,

@@ -9,6 +9,7 @@
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
 #include "client/app/pane.h"
+#include "client/app/remembered.h"
 #include "client/render/image_texture.h"
 #include "client/replay/paired_source.h"
 #include "client/replica/peak_rings.h"
@@ -16,6 +17,18 @@
 #include "common/base/background.h"
 
 namespace trocar::app {
+
+// A picture keeps this of a lesson: the stage's image, one's own best points, and for whom
+// practises alone the wish to leave it, to repeat it or to take the next one.
+struct LessonPart {
+  render::ImageTexture texture;
+  std::string file;  // that it was made from
+  BestPoints best;
+  bool offers_ways_on = false;
+  std::optional<ui::AfterLesson> wish;  // nothing: one stays, or has closed the window
+
+  void load(const replica::Replica& replica);
+};
 
 class Picture {
  public:
@@ -32,7 +45,8 @@ class Picture {
             std::uint64_t now_ns);
   // To be called often: frames pass faster than pictures are drawn.
   void observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns);
-  bool should_close() const { return context_->should_close(); }
+  bool should_close() const { return context_->should_close() || lesson_.wish; }
+  LessonPart& lesson() { return lesson_; }
   bool is_software() const { return context_->is_software(); }
   std::uint64_t count() const { return count_; }
   // Draws once more what was drawn last, as finely as it goes, and returns it.
@@ -76,13 +90,6 @@ class Picture {
     void measure(const replica::ReplicaCounters& counters, std::uint64_t count,
                  std::uint64_t now_ns);
   };
-  struct LessonImage {
-    render::ImageTexture texture;
-    std::string file;  // that it was made from
-
-    void load(const replica::Replica& replica);
-  };
-
   replica::Role role_;
   std::unique_ptr<render::GlContext> context_;
   Pane pane_;
@@ -107,7 +114,7 @@ class Picture {
   bool follows_view_ = false;
   std::uint64_t view_sent_ns_ = 0;
   Rate rate_;
-  LessonImage lesson_image_;
+  LessonPart lesson_;
   Background saving_;  // writes screenshots
 };
 

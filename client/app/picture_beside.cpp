@@ -125,7 +125,7 @@ ui::HudHalf Picture::half(std::size_t number, const Pane& pane,
   half.left = static_cast<float>(pane.region().left);
   half.width = static_cast<float>(pane.region().size.width);
   half.participants = participants_of(replica, pane, true);
-  half.labels = pane.labels(replica);
+  half.labels = pane.labels(replica, true);
   if (is_measuring_) half.ruler = pane.ruler();
   return half;
 }

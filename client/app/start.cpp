@@ -231,11 +231,12 @@ bool wants_start_screen(const ClientOptions& options) {
 
 Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
                                                     const std::string& message,
-                                                    std::unique_ptr<OwnServer>& own) {
+                                                    std::unique_ptr<OwnServer>& own,
+                                                    const std::optional<std::string>& lesson) {
   auto context = render::make_window_context(options.size, "Trocar");
   if (!context) return context.error();
   ui::Hud hud(**context, options.scale);
-  const bool has_tried = !message.empty() || own != nullptr;
+  const bool has_tried = !message.empty() || own != nullptr || lesson;
   options.replay_file.clear();
   options.beside_file.clear();
   if (const auto person = remembered_person(); person && !options.is_told_who && !has_tried) {
@@ -251,6 +252,10 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
   OwnStart own_start(own);
   ui::StartModel model{.tasks = tasks(), .recordings = recordings_at_hand(), .message = message};
   ui::StartChoice practice;
+  if (lesson) {
+    practice = {.deed = ui::StartDeed::Practise, .task = *lesson, .name = options.name};
+    if (const auto begun = own_start.begin(practice); !begun) model.message = begun.error().message;
+  }
   while (!(*context)->should_close() && !is_stop_requested()) {
     const auto begin = monotonic_ns();
     lookout.update(model);

@@ -19,9 +19,11 @@ bool wants_start_screen(const ClientOptions& options);
 
 // Returns the options with what the person has chosen; nothing if the window was closed. `message`:
 // why the last choice did not work. While nobody touches anything, a server of this machine that
-// starts is joined by itself. `own`: the server that the person has started here, if any.
+// starts is joined by itself. `own`: the server that the person has started here, if any. `lesson`:
+// this one is practised at once, without being chosen.
 Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
                                                     const std::string& message,
-                                                    std::unique_ptr<OwnServer>& own);
+                                                    std::unique_ptr<OwnServer>& own,
+                                                    const std::optional<std::string>& lesson);
 
 }  // namespace trocar::app

@@ -4,7 +4,9 @@ namespace trocar::shape {
 namespace {
 
 // Above the flat triangles: the surface that is drawn is rounder than they are.
-constexpr float kLiftMetres = 0.0008f;
+constexpr float kLiftMetres = 0.0008f, kOutlineLiftMetres = 0.0005f;
+constexpr float kOutlineWidth = 1.7f;  // of the line's
+constexpr Colour kOutline{8, 11, 14};
 constexpr float kPartedMetres = 0.030f;
 
 bool is_joined(const RibbonPoint& a, const RibbonPoint& b) {
@@ -13,12 +15,10 @@ bool is_joined(const RibbonPoint& a, const RibbonPoint& b) {
          length(b.position - a.position) < kPartedMetres;
 }
 
-}  // namespace
-
-void add_ribbon(std::span<const RibbonPoint> points, float half_width, Colour colour,
-                MeshVertices& out) {
+void add_bands(std::span<const RibbonPoint> points, float half_width, float lift, Colour colour,
+               MeshVertices& out) {
   const std::array<std::uint8_t, 4> material{colour.r, colour.g, colour.b, 0};
-  const auto place = [](const RibbonPoint& p) { return p.position + p.normal * kLiftMetres; };
+  const auto place = [lift](const RibbonPoint& p) { return p.position + p.normal * lift; };
   // A band from a to b, longer by half its width at both ends, so that bends have no holes.
   const auto add_band = [&](const RibbonPoint& a, const RibbonPoint& b, const Vec3f& along) {
     const auto corner = [&](const RibbonPoint& p, float forward, float aside) {
@@ -41,6 +41,14 @@ void add_ribbon(std::span<const RibbonPoint> points, float half_width, Colour co
       add_band(points[i], points[i], normalized(any, Vec3f{1, 0, 0}));
     }
   }
+}
+
+}  // namespace
+
+void add_ribbon(std::span<const RibbonPoint> points, float half_width, Colour colour,
+                MeshVertices& out) {
+  add_bands(points, kOutlineWidth * half_width, kOutlineLiftMetres, kOutline, out);
+  add_bands(points, half_width, kLiftMetres, colour, out);
 }
 
 }  // namespace trocar::shape

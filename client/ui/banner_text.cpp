@@ -63,11 +63,8 @@ std::vector<Banner> banners_of(const HudModel& model) {
                        RateTone::Warning});
   // A recording plays at its own speed, however slow the session was.
   if (const auto slow = describe(model.figures).banner;
-      !slow.empty() && !model.timeline && !model.is_paused)
-    banners.push_back({slow,
-                       model.has_own_tool ? "The server cannot keep up: move slowly."
-                                          : "The server cannot keep up.",
-                       RateTone::Warning});
+      !slow.empty() && !model.timeline && model.pace_text.empty())
+    banners.push_back({slow, "", RateTone::Notice});
   if (!model.recording_text.empty())
     banners.push_back({model.recording_text,
                        model.has_recording_ended

@@ -54,7 +54,7 @@ void draw_handover(const HudConduct& conduct, const HudHand& hand, HudActions& a
   if (!ImGui::BeginPopup("hand over")) return;
   for (const auto& receiver : conduct.hands)
     for (std::size_t i = 0; receiver.slot != hand.slot && i < hand.instruments.size(); ++i) {
-      const auto instrument = hand.instruments[i] + " (" + std::to_string(i + 1) + ")";
+      const auto instrument = hand.instruments[i] + (i == 0 ? " (right hand)" : " (left hand)");
       const auto line = receiver.slot == conduct.own ? "take over " + instrument
                                                      : instrument + " to " + receiver.name;
       if (!ImGui::Selectable(line.c_str())) continue;
@@ -79,7 +79,7 @@ void draw_hands(const HudConduct& conduct, HudActions& actions) {
     if (ImGui::SmallButton(hand.is_frozen ? "Release" : "Freeze"))
       act(hand.is_frozen ? LeadAction::Release : LeadAction::Freeze);
     ImGui::SameLine();
-    if (ImGui::SmallButton("Take claim")) act(LeadAction::TakeClaim);
+    if (ImGui::SmallButton("Make let go")) act(LeadAction::TakeClaim);
     if (conduct.hands.size() > 1) {
       ImGui::SameLine();
       draw_handover(conduct, hand, actions);

@@ -115,8 +115,8 @@ void Hud::need_letters(const HudModel& model) {
   if (model.conduct)
     for (const auto& mark : model.conduct->marks) fonts_->need(mark);
   if (model.lesson) {
-    for (const auto* text :
-         {&model.lesson->title, &model.lesson->stage, &model.lesson->text, &model.lesson->hint})
+    for (const auto* text : {&model.lesson->title, &model.lesson->stage, &model.lesson->text,
+                             &model.lesson->hint, &model.lesson->verdict})
       fonts_->need(*text);
     for (const auto& [head, lines] : model.lesson->results) {
       fonts_->need(head);
@@ -193,7 +193,7 @@ Sides Hud::draw_session(const HudModel& model, HudActions& actions) {
   const Box banners = draw_banners(model, session, people, scale_);
   draw_labels(model.labels, banners, scale_);
   for (const HudRuler& ruler : model.rulers) draw_ruler(ruler, scale_);
-  Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_) : people;
+  Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_, actions) : people;
   if (model.figures.blood && model.figures.blood->shed_nl > 0)
     right = draw_blood(*model.figures.blood, right, scale_);
   draw_felt_hands(model, right.bottom, scale_);
@@ -232,12 +232,18 @@ HudActions Hud::draw(const HudModel& model) {
     if (pressed(GLFW_KEY_U)) actions.toggle_own_views = true;
     if (pressed(GLFW_KEY_B)) actions.toggle_alignment = true;
   }
-  actions.end_measure = pressed(GLFW_KEY_ESCAPE);
+  actions.leave = pressed(GLFW_KEY_ESCAPE);
   if (model.lesson) {
     actions.answer =
         model.lesson->can_answer && (pressed(GLFW_KEY_ENTER) || pressed(GLFW_KEY_KP_ENTER));
     actions.next_stage = model.lesson->can_lead && pressed(GLFW_KEY_N);
     actions.restart_lesson = model.lesson->can_lead && pressed(GLFW_KEY_K);
+    // Only when it is over, so that no slip of a finger ends an attempt.
+    if (model.lesson->can_go_on && model.lesson->is_over) {
+      if (pressed(GLFW_KEY_N)) actions.after_lesson = AfterLesson::Next;
+      if (pressed(GLFW_KEY_K)) actions.after_lesson = AfterLesson::Repeat;
+      if (pressed(GLFW_KEY_BACKSPACE)) actions.after_lesson = AfterLesson::Leave;
+    }
   }
   if (model.conduct && pressed(GLFW_KEY_P))
     actions.lead = replica::LeadWish{

@@ -93,7 +93,7 @@ struct HudTray {
 // The stage of a lesson, or how it has ended.
 struct HudLesson {
   std::string title, stage, text, hint;  // "2 of 3: Search"; hint: empty: not yet
-  std::optional<float> progress;         // 0 to 1; nothing: a recording does not say
+  std::optional<float> progress;         // 0 to 1; nothing: the goal has none, or a recording
   double seconds = 0, limit_s = 0;
   float force_limit_n = 0;  // 0: there is none
   bool is_too_strong = false;
@@ -101,8 +101,13 @@ struct HudLesson {
   bool is_over = false;
   float points = 0;
   std::vector<std::pair<std::string, std::vector<std::string>>> results;  // head and lines
-  unsigned picture = 0;      // a texture's name; 0: there is none
-  float picture_aspect = 1;  // height over width
+  std::string verdict;  // on one's own last answer; empty: there is none in this stage
+  bool is_right = false;
+  std::string outcome;              // once it is over: passed or not, and the best so far
+  std::vector<std::string> advice;  // likewise
+  bool can_go_on = false;           // one practises alone: leave, repeat, next
+  unsigned picture = 0;             // a texture's name; 0: there is none
+  float picture_aspect = 1;         // height over width
 };
 
 // An instructor leads with these.
@@ -122,7 +127,7 @@ struct HudConduct {
 
 // A tool of one's own, whatever holds it.
 struct HudOwnForce {
-  std::string name;  // "force on your tool"
+  std::string name;  // "force on your right hand"
   shape::Colour colour;
   float force_n = 0;
 };
@@ -156,8 +161,9 @@ struct HudPair {
 };
 
 struct HudModel {
-  std::string title;          // "127.0.0.1:7690" or a file's name
-  std::string organ;          // "liver, 1,553 surface vertices"
+  std::string title;          // "127.0.0.1:7690", which is a figure for research, or a file's name
+  std::string organ;          // "liver"
+  std::size_t vertices = 0;   // of its surface
   std::string own_role;       // "surgeon", "instructor, watching", "replay"
   std::string status;         // empty when live; else what it waits for, or why it is over
   std::string status_advice;  // what to do then
@@ -176,7 +182,7 @@ struct HudModel {
   std::optional<HudTimeline> timeline;
   std::optional<HudPair> pair;  // stands in place of the panels of one session
   float greatest_force_n = 0;   // of all participants' `forces_n`: their common scale
-  bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
+  bool shows_regions = false, shows_holds = false, shows_arrows = false, shows_rate = false;
   std::optional<bool> is_recorded;      // of a live session; nothing: it is not known
   std::string recording_text;           // empty: nothing is wrong with the recording
   bool has_recording_ended = false;     // while the session goes on
@@ -198,16 +204,20 @@ struct HudModel {
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark
 };
 
+// A person who practises alone wants this after a lesson, or instead of going on with it.
+enum class AfterLesson : std::uint8_t { Leave, Repeat, Next };
+
 struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
   bool toggle_rate = false, reset_camera = false, screenshot = false;
   bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool next_lent_view = false;
-  bool toggle_measure = false, end_measure = false;
+  bool toggle_measure = false, leave = false;  // leave: what one is in
   bool toggle_alignment = false, toggle_own_views = false;
   bool switch_hand = false;
   bool answer = false, next_stage = false, restart_lesson = false;
+  std::optional<AfterLesson> after_lesson;
   std::optional<std::string> mark_named, return_to_named;
   std::optional<replica::LeadWish> lead;
   std::optional<std::size_t> take_instrument;

@@ -13,6 +13,9 @@
 namespace trocar::ui {
 namespace {
 
+// The organ in the middle leaves so much at the right of a window of 1280 x 720.
+constexpr float kHelpWidth = 270;
+
 std::string format(const char* pattern, ...) __attribute__((format(printf, 1, 2)));
 std::string format(const char* pattern, ...) {
   char text[160];
@@ -60,7 +63,53 @@ void help_row(const char* key, const char* what) {
   ImGui::TextUnformatted(key);
   ImGui::PopFont();
   ImGui::TableNextColumn();
-  ImGui::TextUnformatted(what);
+  ImGui::TextWrapped("%s", what);
+}
+
+// They stand in the order in which one needs them.
+void help_rows(const HudModel& model) {
+  if (model.has_own_tool) {
+    help_row("move", "moves the tip");
+    help_row("1 to 9, 0", "another instrument");
+    help_row("left button", "use it: hold, cut or push");
+    help_row("wheel, W S", "depth; with Shift finer");
+    help_row("Q, E", "turn it about its shaft");
+    if (model.tray.hands > 1) help_row("Tab", "right hand, left hand");
+    help_row("F Space X", "push, grasp, cut");
+  }
+  if (model.lesson && model.lesson->can_answer) help_row("Enter", "answer: it is here");
+  help_row("right drag", "turn the view");
+  help_row("middle drag", "move the view");
+  help_row("Ctrl+wheel", "zoom; also + and -");
+  help_row("C", "the view as at the start");
+  if (model.can_lend_view)
+    help_row("T", model.timeline ? "see with the next tool" : "see through an endoscope");
+  if (!model.view_text.empty()) help_row("V", "follow the view, or do not");
+  if (model.timeline) {
+    help_row("Space", "play or pause");
+    help_row("left, right", "2 s back or forward");
+    help_row(", .", "a picture back or forward");
+    help_row("Page Up Dn", "to the event before or after");
+  }
+  if (model.pair) {
+    help_row("U", model.pair->has_own_views ? "one view for both" : "a view for each");
+    if (model.pair->has_stages.value_or(false))
+      help_row("B", model.pair->is_by_stage ? "both from their start" : "stage by stage");
+  }
+  if (model.can_mark) {
+    help_row("M", "mark the organ");
+    help_row("Backspace", "return it to the mark");
+    help_row("P", "pause for all, go on");
+  }
+  if (model.lesson && model.lesson->can_lead) help_row("N, K", "next stage, from the start");
+  help_row("D", "measure a length, or end it");
+  help_row("A", model.shows_arrows ? "hide force arrows" : "force arrows, 20 mm per N");
+  help_row("L", model.shows_holds ? "hide who holds what" : "who holds what");
+  help_row("O", model.shows_regions ? "hide how far forces reach" : "how far forces reach");
+  help_row("R", model.shows_rate ? "hide names and figures" : "names and figures");
+  help_row("F12", "save a picture");
+  help_row("Esc", "leave what you are in");
+  help_row("H, F1", "hide this");
 }
 
 }  // namespace
@@ -82,6 +131,7 @@ constexpr double kOldPictureMs = 250;
 // These are for whoever studies the solver or the network.
 void figure_rows(const HudModel& model) {
   const auto& f = model.figures;
+  if (model.vertices > 0) row("surface vertices", with_thousands(model.vertices));
   row("tick", format("%.0f us median, %.0f us p99", f.pace.tick_median_us, f.pace.tick_p99_us));
   row("slow ticks", with_thousands(f.pace.slow_ticks));
   row("active nodes", format("%s, queue %s", with_thousands(f.near.active_nodes).c_str(),
@@ -109,9 +159,14 @@ Box draw_session_panel(const HudModel& model, float scale) {
   ImGui::SetNextWindowPos({kMargin * scale, kMargin * scale});
   ImGui::SetNextWindowSizeConstraints({300 * scale, 0}, {600 * scale, 2000 * scale});
   ImGui::Begin("session", nullptr, kGlass);
-  heading(model.title.c_str());
-  ImGui::TextDisabled("%s", model.own_role.c_str());
-  ImGui::TextDisabled("%s", model.organ.c_str());
+  // One knows where a session runs, and who one is; a recording is known by its file.
+  const bool is_named = model.shows_rate || model.timeline;
+  if (is_named) {
+    heading(model.title.c_str());
+    ImGui::TextDisabled("%s", model.own_role.c_str());
+  }
+  if (!model.organ.empty())
+    is_named ? ImGui::TextDisabled("%s", model.organ.c_str()) : heading(model.organ.c_str());
   ImGui::Separator();
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
     row("session time", clock_text(model.session_seconds));
@@ -134,15 +189,27 @@ Box draw_session_panel(const HudModel& model, float scale) {
   return box;
 }
 
+namespace {
+
+float fading(const HudMessage& message) {
+  return std::clamp(5.0f - message.age_seconds, 0.0f, 1.0f);
+}
+
+}  // namespace
+
 Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale,
                  float top) {
   const std::vector<Banner> banners = banners_of(model);
-  if (banners.empty() && model.messages.empty()) return {};
+  float strongest =
+      banners.empty() ? 0 : 1;  // how much of the box is there: it fades with its words
+  for (const HudMessage& message : model.messages) strongest = std::max(strongest, fading(message));
+  if (strongest <= 0) return {};
   constexpr float kLeastWidth = 300;
   const float right = people.right > 0 ? people.left : ImGui::GetIO().DisplaySize.x;
   const float width = std::max(right - session.right - 2 * kMargin * scale, kLeastWidth * scale);
   const ImVec2 pad = ImGui::GetStyle().WindowPadding;
   ImGui::SetNextWindowPos({(session.right + right) / 2, top + kMargin * scale}, 0, {0.5f, 0});
+  ImGui::SetNextWindowBgAlpha(0.8f * strongest);
   ImGui::Begin("banners", nullptr, kGlass);
   ImGui::PushTextWrapPos(width - pad.x);
   bool is_first = true;
@@ -154,7 +221,7 @@ Box draw_banners(const HudModel& model, const Box& session, const Box& people, f
     if (!banner.advice.empty()) ImGui::TextUnformatted(banner.advice.c_str());
   }
   for (const HudMessage& message : model.messages) {
-    const float alpha = std::clamp(5.0f - message.age_seconds, 0.0f, 1.0f);
+    const float alpha = fading(message);
     if (alpha <= 0) continue;
     if (!std::exchange(is_first, false)) ImGui::Separator();
     ImVec4 colour = message.is_trouble ? kTrouble : kGood;
@@ -167,75 +234,34 @@ Box draw_banners(const HudModel& model, const Box& session, const Box& people, f
   return box;
 }
 
+// The keys stand in the column at the right, beside the organ and below what is there. Where they
+// do not fit, one scrolls them.
 Box draw_help(const HudModel& model, const Box& timeline, const Sides& sides, const Box& before,
               float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float bottom = (timeline.top > 0 ? timeline.top : screen.y) - kMargin * scale;
-  // Under the panel of people: the bar of one's own force is at the left.
-  const bool covers = bottom - (before.bottom - before.top) < sides.right.bottom;
-  if (model.timeline && covers && sides.left.bottom < sides.right.bottom)
-    ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
-  else
-    ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
+  const float room = bottom - sides.right.bottom - kMargin * scale;
+  const bool scrolls = model.shows_help && before.bottom - before.top >= room;
+  ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
-  ImGui::Begin("help", nullptr, kGlass);
+  if (model.shows_help)
+    ImGui::SetNextWindowSizeConstraints({kHelpWidth * scale, 0},
+                                        {kHelpWidth * scale, std::max(room, 80 * scale)});
+  ImGui::Begin("help", nullptr, scrolls ? kPanel & ~ImGuiWindowFlags_NoScrollbar : kGlass);
   if (!model.shows_help) {
     ImGui::TextDisabled(
         model.has_own_tool ? "1-9 instrument   left button use it   wheel depth   Q E turn   H help"
                            : "right drag turn   Ctrl+wheel zoom   H help");
-    const Box box = box_of_window();
-    ImGui::End();
-    return box;
+  } else {
+    heading("Mouse and keys");
+    ImGui::Separator();
+    if (ImGui::BeginTable("keys", 2)) {
+      ImGui::TableSetupColumn("", ImGuiTableColumnFlags_WidthFixed, 82 * scale);
+      ImGui::TableSetupColumn("", ImGuiTableColumnFlags_WidthFixed, 145 * scale);
+      help_rows(model);
+      ImGui::EndTable();
+    }
   }
-  heading("Mouse and keyboard");
-  ImGui::Separator();
-  if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
-    if (model.has_own_tool) {
-      help_row("move", "the tip follows the pointer, just above the tissue");
-      help_row("1 to 9, 0", "take another instrument");
-      help_row("left button", "use it: a grasper holds, an edge cuts, others push");
-      help_row("F, Space, X", "push, grasp, cut, where the instrument can");
-      help_row("Q, E", "turn it about its shaft");
-      if (model.tray.hands > 1) help_row("Tab", "the other hand; this one goes on holding");
-      help_row("wheel, W / S", "depth along the view; Shift: finer");
-    }
-    if (model.can_mark) {
-      help_row("M", "mark the organ as it is");
-      help_row("Backspace", "return it to the mark, for everybody");
-      help_row("P", "pause the session for everybody, or let it go on");
-    }
-    if (model.can_lend_view)
-      help_row("T",
-               model.timeline ? "see with the next tool" : "see through an endoscope, or the next");
-    if (!model.view_text.empty()) help_row("V", "follow the view that was given, or do not");
-    if (model.timeline) {
-      help_row("Space", "play or pause");
-      help_row("left, right", "two seconds back or on");
-      help_row(", .", "one picture back or on");
-      help_row("Page Up, Page Down", "to the event before or after");
-    }
-    if (model.pair) {
-      help_row("U", model.pair->has_own_views ? "one view for both" : "a view for each");
-      if (model.pair->has_stages.value_or(false))
-        help_row("B", model.pair->is_by_stage ? "both from their start" : "stage by stage");
-    }
-    help_row("D", "measure: click two points; D or Esc ends that");
-    help_row("right drag", "turn the view");
-    help_row("middle drag", "move the view");
-    help_row("Ctrl+wheel, + -", "zoom");
-    help_row("C", "view as at the start");
-    help_row("O", model.shows_regions ? "hide active regions" : "show active regions");
-    help_row("L", model.shows_holds ? "hide who holds what" : "show who holds what");
-    help_row("A", model.shows_arrows ? "hide force arrows" : "show force arrows");
-    help_row("R",
-             model.shows_rate ? "hide the figures for research" : "show the figures for research");
-    help_row("F12", "screenshot into the current folder");
-    help_row("H, F1", "hide this");
-    ImGui::EndTable();
-  }
-  ImGui::TextDisabled("Arrows: force of the tissue on a tool, 20 mm per N.");
-  ImGui::TextDisabled("A line from a tool to a small ball: where the hand is, when");
-  ImGui::TextDisabled("tissue keeps the tool from it.");
   const Box box = box_of_window();
   ImGui::End();
   return box;

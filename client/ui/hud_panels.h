@@ -28,7 +28,7 @@ void draw_people(std::span<const HudParticipant> people, float greatest_n, bool 
 // Two recordings: what each is, where it is, and who does what.
 void draw_pair(const HudModel& model, float scale);
 // The lesson's stage, under the panel of people; returns where both are.
-Box draw_lesson(const HudLesson& lesson, const Box& people, float scale);
+Box draw_lesson(const HudLesson& lesson, const Box& people, float scale, HudActions& actions);
 // Blood lost, under the panels above; returns where all of them are.
 Box draw_blood(const wire::BloodFigures& blood, const Box& above, float scale);
 // A bar at the bottom shows the force that one's own tools meet.

@@ -89,6 +89,12 @@ float width_of_figures(std::span<const HudParticipant> people, bool shows_rate) 
   return width;
 }
 
+// One's own name is for research: everybody knows it.
+std::string shown_name(const HudParticipant& p, bool shows_rate) {
+  if (!p.is_self) return p.name;
+  return shows_rate ? p.name + " (you)" : "you";
+}
+
 // Torque and nodes are figures for research.
 void draw_figures(const HudParticipant& p, bool shows_all) {
   if (!p.has_tool || (p.contact_nodes == 0 && p.force_n < 0.005f)) return;
@@ -115,7 +121,7 @@ void draw_people(std::span<const HudParticipant> people, float greatest_n, bool 
       draw_dot(p, scale);
       ImGui::TableNextColumn();
       if (p.is_self) ImGui::PushFont(bold());
-      ImGui::TextUnformatted((p.is_self ? p.name + " (you)" : p.name).c_str());
+      ImGui::TextUnformatted(shown_name(p, shows_rate).c_str());
       if (p.is_self) ImGui::PopFont();
       ImGui::TableNextColumn();
       draw_doing(p);

@@ -51,9 +51,12 @@ RateText describe(const wire::FrameFigures& figures) {
     text.load = whole(rate.predicted_us) + " of " + whole(rate.budget_us) + " us";
   if (rate.level != wire::RateLevel::Fixed)
     text.changes = with_thousands(rate.lowered) + " down, " + with_thousands(rate.raised) + " up";
-  if (rate.time_rate < kSlowTimeRate)
-    text.banner = "Slow motion: " + whole(100 * rate.time_rate) + " % of real speed";
+  if (rate.time_rate < kSlowTimeRate) text.banner = slow_text(rate.time_rate);
   return text;
+}
+
+std::string slow_text(float time_rate) {
+  return "Time is slow, " + whole(100 * time_rate) + " % of real speed. Go on.";
 }
 
 }  // namespace trocar::ui

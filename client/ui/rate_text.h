@@ -23,6 +23,9 @@ struct RateText {
 };
 RateText describe(const wire::FrameFigures& figures);
 
+// The same words as those of the page.
+std::string slow_text(float time_rate);
+
 // "1,553"
 std::string with_thousands(std::uint64_t value);
 

@@ -52,8 +52,8 @@ TEST(BannerText, EachStateSaysWhatToDo) {
   model.has_own_tool = true;
   banners = banners_of(model);
   ASSERT_EQ(banners.size(), 1u);
-  EXPECT_EQ(banners[0].text, "Slow motion: 50 % of real speed");
-  EXPECT_EQ(banners[0].advice, "The server cannot keep up: move slowly.");
+  EXPECT_EQ(banners[0].text, "Time is slow, 50 % of real speed. Go on.");
+  EXPECT_EQ(banners[0].advice, "");
   model.timeline = HudTimeline{};
   EXPECT_TRUE(banners_of(model).empty());
 

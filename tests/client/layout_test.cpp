@@ -13,13 +13,14 @@ namespace {
 HudModel full_model() {
   HudModel model;
   model.title = "operating-theatre-4.hospital.example:7690";
-  model.organ = "liver, 12,345 surface vertices";
+  model.organ = "liver";
+  model.vertices = 12'345;
   model.own_role = "instructor, Maximiliane";
   model.frozen_text = "Maximiliane keeps your tools where they are.";
   model.surface_age_ms = 1200;
   model.figures.pace.rate.time_rate = 0.4f;
   model.shows_help = model.has_own_tool = model.can_mark = model.shows_rate = true;
-  for (const char* name : {"force on your tool 1", "force on your tool 2"})
+  for (const char* name : {"force on your right hand", "force on your left hand"})
     model.own_forces.push_back({name, {}, 1.2f});
   model.tray = {.names = {"all", "probe", "grasper", "toothed", "scissors", "scalpel", "hook"},
                 .texts = {"", "", "", "", "", "", ""},
@@ -76,6 +77,18 @@ render::Image recorded_lesson(bool shows_help) {
     hud.render();
   }
   return (*context)->read_image();
+}
+
+// The column at the right begins 296 pixels before the edge; the organ ends before it.
+TEST(Layout, TheKeysStandBesideTheOrgan) {
+  const auto without = recorded_lesson(false), with = recorded_lesson(true);
+  int changed = 0;
+  for (int y = 0; y < 530; ++y)
+    for (int x = 300; x < 1280 - 296; ++x) {
+      const auto at = static_cast<std::size_t>(y * 1280 + x) * 3;
+      changed += without.rgb[at + 1] != with.rgb[at + 1];
+    }
+  EXPECT_EQ(changed, 0);
 }
 
 TEST(Layout, TheKeysOfARecordingDoNotCoverItsLesson) {
