@@ -126,7 +126,7 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
                    "--config: is missing, name a file, or give one of list, start and end"};
     return std::optional(std::move(options));
   }
-  if (const auto parsed = parse_at(options); !parsed) return parsed.error();
+  if (const auto placed = parse_at(options); !placed) return placed.error();
   if (options.key_file.empty() && options.command != HallCommand::List)
     return Error{ErrorCode::Usage, "--key: is missing, name the file of the hall's key"};
   return std::optional(std::move(options));

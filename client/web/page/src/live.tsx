@@ -205,11 +205,6 @@ export function Live(props: {
                   ? 'live'
                   : `${Math.max(0, Math.round(age))} ms old`}
         </span>
-        {isLive && rate < 1 && (
-          <span class="age late" role="status">
-            {`Time is slow, ${Math.round(rate * 100)} % of real speed. Go on.`}
-          </span>
-        )}
         {isRecorded.current !== null && (
           <span class="age">{isRecorded.current ? 'recorded' : 'not recorded'}</span>
         )}
@@ -255,7 +250,7 @@ export function Live(props: {
               />
             )
           }
-          {...(mayMark && isLive ? { onPoint: place => session.point(place) } : {})}
+          {...(mayMark ? { onPoint: place => session.point(place) } : {})}
         >
           {session.state === 'away' && (
             <p class="banner" role="alert">
@@ -272,6 +267,11 @@ export function Live(props: {
               class="banner"
               role="status"
             >{`${pace.current?.by || 'Somebody'} has paused the session.`}</p>
+          )}
+          {isLive && !isPaused && rate < 1 && (
+            <p class="banner" role="status">
+              {`Time is slow, ${Math.round(rate * 100)} % of real speed. Go on.`}
+            </p>
           )}
           {session.state === 'joining' && <p class="banner">Joining the session</p>}
           {session.state === 'live' && replica.frames === 0 && (
