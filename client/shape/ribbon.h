@@ -1,6 +1,6 @@
 #pragma once
 
-// A line on a surface as triangles: a flat band of one colour that lies on it.
+// A line on a surface as triangles: a flat band of one colour that lies on it, with a dark border.
 
 #include <span>
 

@@ -79,10 +79,15 @@ TEST(Ribbon, JoinsNeighboursAndLeavesGaps) {
                                                {{0, 0, 0}, {}}};
   shape::MeshVertices mesh;
   shape::add_ribbon(points, 0.001f, {1, 2, 3}, mesh);
-  EXPECT_EQ(mesh.size(), 3 * 6u) << "two bands, and a dot beyond the gap";
+  EXPECT_EQ(mesh.size(), 2 * 3 * 6u) << "two bands, a dot beyond the gap, and their dark border";
   for (const auto& vertex : mesh) {
+    const bool is_line = vertex.material[0] == 1;
     EXPECT_GT(vertex.position.z, 0) << "above the surface";
-    EXPECT_LE(std::abs(vertex.position.y), 0.0016f);
+    EXPECT_LE(std::abs(vertex.position.y), is_line ? 0.0016f : 0.0027f);
+    for (const auto& other : mesh)
+      if (is_line && other.material[0] != 1) {
+        EXPECT_GT(vertex.position.z, other.position.z) << "the border lies below";
+      }
   }
 }
 
