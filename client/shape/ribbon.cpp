@@ -3,10 +3,11 @@
 namespace trocar::shape {
 namespace {
 
-// Above the flat triangles: the surface that is drawn is rounder than they are.
-constexpr float kLiftMetres = 0.0008f, kOutlineLiftMetres = 0.0005f;
-constexpr float kOutlineWidth = 1.7f;  // of the line's
-constexpr Colour kOutline{8, 11, 14};
+// Above the flat triangles: the surface that is drawn is rounder than they are. A dark band below
+// the line makes it stand out from a highlight.
+constexpr float kLiftMetres = 0.0009f, kBorderLiftMetres = 0.0007f;
+constexpr float kBorderWidths = 1.7f;
+constexpr Colour kBorder{12, 12, 16};
 constexpr float kPartedMetres = 0.030f;
 
 bool is_joined(const RibbonPoint& a, const RibbonPoint& b) {
@@ -15,16 +16,21 @@ bool is_joined(const RibbonPoint& a, const RibbonPoint& b) {
          length(b.position - a.position) < kPartedMetres;
 }
 
-void add_bands(std::span<const RibbonPoint> points, float half_width, float lift, Colour colour,
-               MeshVertices& out) {
-  const std::array<std::uint8_t, 4> material{colour.r, colour.g, colour.b, 0};
-  const auto place = [lift](const RibbonPoint& p) { return p.position + p.normal * lift; };
+struct Band {
+  float half_width, lift;  // m
+  Colour colour;
+};
+
+void add_bands(std::span<const RibbonPoint> points, const Band& band, MeshVertices& out) {
+  const std::array<std::uint8_t, 4> material{band.colour.r, band.colour.g, band.colour.b, 0};
+  const auto place = [&](const RibbonPoint& p) { return p.position + p.normal * band.lift; };
   // A band from a to b, longer by half its width at both ends, so that bends have no holes.
   const auto add_band = [&](const RibbonPoint& a, const RibbonPoint& b, const Vec3f& along) {
     const auto corner = [&](const RibbonPoint& p, float forward, float aside) {
       const Vec3f side = normalized(cross(p.normal, along), Vec3f{1, 0, 0});
-      return MeshVertex{place(p) + along * (forward * half_width) + side * (aside * half_width),
-                        p.normal, material};
+      return MeshVertex{
+          place(p) + along * (forward * band.half_width) + side * (aside * band.half_width),
+          p.normal, material};
     };
     const auto p = corner(a, -1, -1), q = corner(b, 1, -1), s = corner(b, 1, 1),
                t = corner(a, -1, 1);
@@ -47,8 +53,8 @@ void add_bands(std::span<const RibbonPoint> points, float half_width, float lift
 
 void add_ribbon(std::span<const RibbonPoint> points, float half_width, Colour colour,
                 MeshVertices& out) {
-  add_bands(points, kOutlineWidth * half_width, kOutlineLiftMetres, kOutline, out);
-  add_bands(points, half_width, kLiftMetres, colour, out);
+  add_bands(points, {half_width * kBorderWidths, kBorderLiftMetres, kBorder}, out);
+  add_bands(points, {half_width, kLiftMetres, colour}, out);
 }
 
 }  // namespace trocar::shape

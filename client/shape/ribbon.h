@@ -1,7 +1,6 @@
 #pragma once
 
-// A line on a surface as triangles: a flat band of one colour that lies on it, and below it a wider
-// dark one, so that a bright line is seen where wet tissue shines.
+// A line on a surface as triangles: a flat band of one colour that lies on it, with a dark border.
 
 #include <span>
 
@@ -14,9 +13,8 @@ struct RibbonPoint {
   Vec3f normal;    // of the surface, of unit length; zero: the line has a gap here
 };
 
-// Appends to `out` the dark band's triangles, then as many of the line, in the frame of the points.
-// Neighbours farther apart than 30 mm are not joined: tissue has parted between them. A point
-// without a neighbour is a dot.
+// Appends to `out`, in the frame of the points. Neighbours farther apart than 30 mm are not joined:
+// tissue has parted between them. A point without a neighbour is a dot.
 void add_ribbon(std::span<const RibbonPoint> points, float half_width, Colour colour,
                 MeshVertices& out);
 
