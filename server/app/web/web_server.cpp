@@ -234,8 +234,9 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       if (!site::is_own_host(view_of(request[http::field::host]), options.public_name, machine)) {
         ++counters.forbidden;
         request.keep_alive(false);
-        Answer refusal = refuse(request, http::status::misdirected_request,
-                                "This server has another name: see --public-name.\n");
+        Answer refusal =
+            refuse(request, http::status::misdirected_request,
+                   "This server has another name: ask whoever runs it for the right link.\n");
         co_await send(stream, request, refusal);
         break;
       }
@@ -341,7 +342,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     if (!content.recordings) {
       ++counters.not_found;
       return refuse(request, http::status::not_found,
-                    "No recordings are served here (--recordings).\n");
+                    "No recordings are served here: ask whoever runs the server.\n");
     }
     if (const auto wait = key_limiter.seconds_to_wait(peer, monotonic_ns()); wait > 0) {
       ++counters.forbidden;
