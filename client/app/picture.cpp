@@ -107,7 +107,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                                 Hands& hands, std::uint64_t now_ns) const {
   ui::HudModel model;
   const Onlooker onlooker{role_, source.playback() != nullptr, lesson_.offers_ways_on};
-  add_person(replica, onlooker, follows_view_, model);
+  add_person(replica, onlooker, shared_view_.follows, model);
   add_connection(source, pane_.surface().is_valid(), model);
   add_figures(replica, source, now_ns, model);
   model.pictures_per_second = rate_.pictures_per_second;
@@ -155,7 +155,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.leave && !leaves_help && !is_measuring_) leave_lent_views();
   if (actions.toggle_measure || (actions.leave && !leaves_help && is_measuring_)) toggle_measure();
   if (actions.next_lent_view) pane_.lent().next(pane_.scene().tools, source.playback() != nullptr);
-  if (actions.toggle_follow) follows_view_ = !follows_view_;
+  if (actions.toggle_follow) shared_view_.follows = !shared_view_.follows;
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
@@ -176,10 +176,10 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
                          const device::PointerInput& input) {
   const auto* own = replica.find_participant(replica.own_slot());
   if (own != nullptr && own->leads_view) {
-    follows_view_ = false;
+    shared_view_.follows = false;
     if (input.right || input.middle) pane_.lent().leave();
-    if (last_ns_ - view_sent_ns_ < kViewNs || !pane_.is_framed()) return;
-    view_sent_ns_ = last_ns_;
+    if (last_ns_ - shared_view_.sent_ns < kViewNs || !pane_.is_framed()) return;
+    shared_view_.sent_ns = last_ns_;
     const auto view = pane_.camera().rays(pane_.size());
     const Vec3f target = pane_.camera().lens() ? view.eye + view.forward * kLentTargetMetres
                                                : pane_.camera().centre();
@@ -188,11 +188,11 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
   }
   // Whoever moves the view follows nobody.
   if (input.right || input.middle || (input.control && input.wheel != 0)) {
-    follows_view_ = false;
+    shared_view_.follows = false;
     leave_lent_views();
   }
   const auto& led = replica.led_view();
-  if (!follows_view_ || !led) return;
+  if (!shared_view_.follows || !led) return;
   pane_.cease_to_aim();
   pane_.camera().look(led->eye_m, led->target_m);
 }

@@ -114,8 +114,10 @@ class Picture {
   // Keeps what each device has rendered and what the server said, N.
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
   std::array<FeltForces, kToolsPerHand> felt_forces_;
-  bool follows_view_ = false;
-  std::uint64_t view_sent_ns_ = 0;
+  struct SharedView {
+    bool follows = false;
+    std::uint64_t sent_ns = 0;
+  } shared_view_;
   Rate rate_;
   LessonPart lesson_;
   Background saving_;  // writes screenshots

@@ -94,7 +94,7 @@ struct Taker {
                .over = [this](wire::EndReason, const std::string& text) { over = text; }});
   }
   // 0: there is no picture.
-  std::uint32_t crc() const { return copy && copy->has_frame() ? copy->surface_crc() : 0; }
+  std::uint32_t crc() const { return copy && copy->has_frame() ? copy->newest()->surface_crc : 0; }
 
   std::vector<proto::Welcome> welcomes;
   std::unique_ptr<follow::SessionCopy> copy;

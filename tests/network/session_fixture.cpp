@@ -193,7 +193,7 @@ LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptio
   connections_ = std::make_unique<crowd::GuestConnections>(*tcp_);
   replicator_ = std::make_unique<replication::Replicator>(*connections_, inbox, layout_,
                                                           organ_.name, 42, std::move(options));
-  connections_->set_handler(*replicator_);
+  connections_->set_handler(replicator_->handler());
   tcp_->start(*connections_);
   port_ = tcp_->port();
   surface_.resize(layout_.vertex_count());

@@ -2,14 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <set>
 
 #include "common/wire/tool_shape.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
+#include "server/session/replication/admission.h"
 #include "server/session/replication/lesson_course.h"
 #include "server/session/replication/marks.h"
+#include "server/session/replication/returns.h"
 #include "server/session/replication/teaching.h"
+#include "server/session/replication/viewers.h"
 
 namespace trocar::replication {
 namespace {
@@ -112,6 +117,8 @@ class SessionParts : public ::testing::Test {
   Pace pace_{session_, hands_.held()};
   Drawing drawing_{session_};
   Teaching teaching_{session_, door_, hands_, pace_, drawing_};
+  Returns returns_{session_, counters_};
+  Admission admission_{session_, door_, returns_.absences()};
   Speaker ada_{1, options_}, ben_{2, options_};
 };
 
@@ -219,6 +226,255 @@ TEST_F(SessionParts, ASessionWithoutALessonSaysSo) {
   EXPECT_FALSE(course.ask(ada_, request, {}));
   EXPECT_NE(heard("Ada").back().teach_event().text().find("no lesson"), std::string::npos);
   EXPECT_TRUE(course.ask(ben_, request, {})) << "stages are the instructor's";
+}
+
+HelloRequest request_of(const std::string& name, participants::Role role) {
+  HelloRequest request;
+  request.name = name;
+  request.role = role;
+  request.can_return = true;
+  return request;
+}
+
+Speaker newcomer(const HelloRequest& request, const ReplicatorOptions& options) {
+  Speaker who(3, options);
+  who.applicant = {"10.0.0.3", request.name, request.role};
+  return who;
+}
+
+TEST_F(SessionParts, WhoIsAdmittedHasAPlaceAToolAndATokenToComeBackWith) {
+  auto request = request_of("Cy", participants::Role::Assistant);
+  auto cy = newcomer(request, options_);
+  ASSERT_FALSE(admission_.admit(cy, request));
+  ASSERT_TRUE(cy.participant);
+  EXPECT_EQ(roster_.find("Cy")->slot, cy.participant->slot);
+  EXPECT_NE(returns_.absences().find(cy.participant->slot), nullptr);
+  const auto inputs = drained();
+  ASSERT_EQ(inputs.joins.size(), 1u);
+  EXPECT_EQ(inputs.joins[0].slot, cy.participant->slot);
+  auto again = request_of("Cy", participants::Role::Observer);
+  auto other = newcomer(again, options_);
+  const auto refused = admission_.admit(other, again);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->reason, EndReason::NameTaken);
+  EXPECT_FALSE(other.participant);
+}
+
+TEST_F(SessionParts, AClosedDoorLetsInstructorsInAndListsWhoWaits) {
+  door_.set_closed(true);
+  session_.is_told = true;
+  auto request = request_of("Cy", participants::Role::Observer);
+  auto cy = newcomer(request, options_);
+  const auto refused = admission_.admit(cy, request);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->reason, EndReason::Closed);
+  EXPECT_FALSE(session_.is_told) << "everybody is to see who waits";
+  EXPECT_EQ(roster_.find("Cy"), nullptr);
+  auto leader = request_of("Di", participants::Role::Instructor);
+  auto di = newcomer(leader, options_);
+  EXPECT_FALSE(admission_.admit(di, leader));
+}
+
+TEST_F(SessionParts, WithoutRoomInTheInboxNobodyWithToolsIsLetIn) {
+  while (inbox_.try_push_join({ben_.participant->slot, 1, {}})) continue;
+  auto request = request_of("Cy", participants::Role::Surgeon);
+  auto cy = newcomer(request, options_);
+  const auto refused = admission_.admit(cy, request);
+  ASSERT_TRUE(refused);
+  EXPECT_NE(refused->text.find("busy"), std::string::npos) << refused->text;
+  EXPECT_EQ(roster_.find("Cy"), nullptr);
+}
+
+TEST_F(SessionParts, ASeatIsKeptForItsTokenAndNameAndGivenUpInTheEnd) {
+  const auto slot = ben_.participant->slot;
+  auto lost = std::make_unique<Speaker>(ben_);
+  EXPECT_FALSE(returns_.keep(lost)) << "he has no token";
+  const auto token = *returns_.absences().issue(slot);
+  ASSERT_TRUE(returns_.keep(lost));
+  EXPECT_TRUE(roster_.find("Ben")->is_away);
+  EXPECT_EQ(counters_.lost, 1u);
+  ASSERT_NE(returns_.find(slot), nullptr);
+
+  auto request = request_of("Ben", participants::Role::Surgeon);
+  request.return_token.assign(token.begin(), token.end());
+  ASSERT_NE(returns_.find_own_place(request), nullptr);
+  auto stranger = request;
+  stranger.name = "Eve";
+  EXPECT_EQ(returns_.find_own_place(stranger), nullptr) << "the name is not hers";
+  stranger = request;
+  stranger.return_token[0] ^= 1;
+  EXPECT_EQ(returns_.find_own_place(stranger), nullptr);
+
+  Speaker back(9, options_);
+  returns_.come_back(back, *returns_.take(slot));
+  EXPECT_EQ(back.participant->slot, slot);
+  EXPECT_FALSE(roster_.find("Ben")->is_away);
+  EXPECT_EQ(returns_.find(slot), nullptr);
+
+  lost = std::make_unique<Speaker>(back);
+  ASSERT_TRUE(returns_.keep(lost));
+  wait_s(options_.return_seconds - 1);
+  EXPECT_TRUE(returns_.take_expired(now_ns_).empty());
+  wait_s(2);
+  EXPECT_EQ(returns_.take_expired(now_ns_).size(), 1u);
+}
+
+// Connections of which a test sees what is queued, and whose room it sets.
+class FakeConnections final : public net::Connections {
+ public:
+  bool send(net::ConnectionId id, wire::SharedBytes frame) override {
+    if (full.contains(id)) return false;
+    proto::Envelope message;
+    EXPECT_TRUE(wire::decode_envelope(BytesView(*frame).subspan(wire::kHeaderBytes), message).ok());
+    sent[id].push_back(message);
+    return true;
+  }
+  bool has_datagrams(net::ConnectionId) const override { return false; }
+  bool send_datagram(net::ConnectionId, BytesView) override { return false; }
+  std::size_t outstanding_bytes(net::ConnectionId id) const override {
+    return busy.contains(id) ? 1'000'000 : 0;
+  }
+  std::string peer_address(net::ConnectionId) const override { return "10.0.0.1"; }
+  net::ConnectionId carrier_of(net::ConnectionId id) const override { return id >= 100 ? 9 : 0; }
+  void close_after_flush(net::ConnectionId id, wire::SharedBytes) override { closed.insert(id); }
+  void close(net::ConnectionId id) override { closed.insert(id); }
+  // Returns what that one was sent of a kind, since the last call.
+  std::size_t count(net::ConnectionId id, proto::Envelope::MessageCase kind) {
+    const auto all = std::exchange(sent[id], {});
+    return static_cast<std::size_t>(std::ranges::count(all, kind, &proto::Envelope::message_case));
+  }
+
+  std::map<net::ConnectionId, std::vector<proto::Envelope>> sent;
+  std::set<net::ConnectionId> full, busy, closed;
+};
+
+// Lets in whoever says Hello.
+class OpenHouse final : public ViewerHost {
+ public:
+  explicit OpenHouse(const ReplicatorOptions& options)
+      : viewers(connections, *this, options, counters) {
+    proto::Envelope envelope;
+    envelope.mutable_surface_topology();
+    surface = wire::encode_envelope(envelope);
+  }
+  std::optional<Ending> heed(Viewer& who, const proto::Envelope& message) override {
+    heeded.push_back(message.message_case());
+    if (!message.has_hello()) return std::nullopt;
+    proto::Envelope words;
+    words.mutable_welcome();
+    return viewers.welcome(who, wire::encode_envelope(words), true);
+  }
+  std::optional<Ending> heed_samples(const Viewer&, const proto::ClientDatagram&) override {
+    return std::nullopt;
+  }
+  void note_shown(const Viewer& who, const proto::FrameAck&) override { shown.push_back(who.id); }
+  bool show(const Viewer& who) override { return viewers.send(who.id, surface); }
+  const wire::SharedBytes& topology() override { return surface; }
+  const std::vector<wire::SharedBytes>& fine_parts() const override { return parts; }
+  std::uint64_t server_time_us() const override { return 7; }
+  bool keep(const Viewer&) override { return false; }
+  void forget(const Viewer& who, const Ending* ending) override {
+    gone[who.id] = ending ? ending->reason : EndReason::Unspecified;
+  }
+
+  void say(net::ConnectionId id, const proto::Envelope& message) {
+    const auto bytes = message.SerializeAsString();
+    viewers.on_message(id, bytes_of(std::string_view(bytes)));
+  }
+  void join(net::ConnectionId id) {
+    viewers.on_open(id);
+    proto::Envelope hello;
+    hello.mutable_hello();
+    say(id, hello);
+  }
+  void publish(Frame number) {
+    auto frame = std::make_shared<step::PublishedFrame>();
+    frame->frame = number;
+    frame->tick = 16 * number;
+    frame->surface.resize(3);
+    frame->surface[0].x = static_cast<std::int32_t>(number);
+    viewers.set_frame(frame, 0);
+    viewers.give_all();
+  }
+
+  FakeConnections connections;
+  ReplicatorCounters counters;
+  Viewers viewers;
+  wire::SharedBytes surface;
+  std::vector<wire::SharedBytes> parts;
+  std::vector<proto::Envelope::MessageCase> heeded;
+  std::vector<net::ConnectionId> shown;
+  std::map<net::ConnectionId, EndReason> gone;
+};
+
+using Kind = proto::Envelope;
+
+TEST_F(SessionParts, AViewerIsShownEverythingThenEachFrameThatItTakes) {
+  OpenHouse house(options_);
+  house.publish(1);
+  house.join(1);
+  const auto& told = house.connections.sent[1];
+  ASSERT_EQ(told.size(), 4u);
+  EXPECT_TRUE(told[0].has_welcome() && told[1].has_surface_topology());
+  EXPECT_TRUE(told[2].surface_frame().is_keyframe() && told[3].has_frame_state());
+  house.connections.sent.clear();
+  house.publish(2);
+  EXPECT_EQ(house.connections.sent[1].at(0).surface_frame().base_frame(), 1u);
+  house.connections.busy = {1};
+  house.publish(3);
+  house.connections.busy = {};
+  EXPECT_EQ(house.connections.count(1, Kind::kSurfaceFrame), 1u) << "3 was left out";
+  house.viewers.give_all();
+  EXPECT_EQ(house.connections.sent[1].at(0).surface_frame().base_frame(), 2u);
+}
+
+TEST_F(SessionParts, AViewerWithoutRoomForWhatCannotBeSkippedIsTooSlowAlone) {
+  OpenHouse house(options_);
+  house.join(1);
+  house.join(2);
+  house.connections.full = {1};
+  house.viewers.offer(house.surface);
+  EXPECT_TRUE(house.gone.empty()) << "what was offered may be missed";
+  house.viewers.broadcast(house.surface);
+  EXPECT_EQ(house.gone, (std::map<net::ConnectionId, EndReason>{{1, EndReason::TooSlow}}));
+  EXPECT_TRUE(house.connections.closed.contains(1));
+  EXPECT_EQ(house.viewers.connection_count(), 1u);
+  EXPECT_EQ(house.connections.count(2, Kind::kSurfaceTopology), 3u);
+}
+
+TEST_F(SessionParts, AcknowledgementsAreOfFramesThatWereGiven) {
+  OpenHouse house(options_);
+  house.join(1);
+  house.publish(5);
+  proto::Envelope ack;
+  ack.mutable_frame_ack()->set_frame(5);
+  house.say(1, ack);
+  EXPECT_EQ(house.shown, std::vector<net::ConnectionId>{1});
+  EXPECT_EQ(house.viewers.find(1)->feed.acknowledged(), 5u);
+  ack.mutable_frame_ack()->set_frame(6);
+  house.say(1, ack);
+  EXPECT_EQ(house.gone.at(1), EndReason::ProtocolError);
+}
+
+TEST_F(SessionParts, GuestsShareThePictureOfTheirCarrierAndAnswerForThemselves) {
+  OpenHouse house(options_);
+  house.viewers.on_open(9);
+  house.join(100);
+  house.join(101);
+  EXPECT_EQ(house.connections.count(9, Kind::kSurfaceTopology), 1u);
+  EXPECT_EQ(house.connections.count(100, Kind::kSurfaceTopology), 0u);
+  house.publish(1);
+  EXPECT_EQ(house.connections.count(9, Kind::kSurfaceFrame), 1u);
+  EXPECT_EQ(house.connections.count(101, Kind::kSurfaceFrame), 0u);
+  proto::Envelope ack, order;
+  ack.mutable_frame_ack()->set_frame(1);
+  house.say(101, ack);
+  EXPECT_EQ(house.shown, std::vector<net::ConnectionId>{101});
+  order.mutable_teach_request();
+  house.say(101, order);
+  EXPECT_EQ(house.heeded.back(), Kind::kTeachRequest);
+  house.say(9, order);
+  EXPECT_EQ(house.gone.at(9), EndReason::ProtocolError) << "it says nothing for itself";
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ class RelayedSession : public ::testing::Test {
     };
     options.server_time_us = [](std::uint64_t now_us) { return now_us + 7; };
     crowd_ = std::make_unique<crowd::Crowd>(*connections_, std::move(options));
-    connections_->set_handler(*crowd_);
+    connections_->set_handler(crowd_->handler());
     thread_ = std::thread([this] { io_.run(); });
     session_.publish(10);
     join_server(session_);

@@ -55,14 +55,15 @@ TEST(PageMessage, OfAToolIsForRolesThatMayHaveSome) {
 
 TEST(JoinRequest, OfAnotherFormIsRefused) {
   JoinRequest request;
-  for (const auto* text :
-       {"", "[]", "null", "{", "{\"name\": \"Ann\"}", "\xff\xfe", "{\"role\": 4}",
-        R"({"role": "root", "code": "7K3M-9QXZ-4T2B-WN8C", "name": "Ann"})",
-        R"({"role": "observer", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["probe"]})",
-        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["chainsaw"]})",
-        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": [1]})",
-        R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["probe", "probe", "probe"]})",
-        R"({"role": "observer", "code": "7K3M-9QXZ-4T2B-WN8C", "token": "00"})"}) {
+  for (
+      const auto* text :
+      {"", "[]", "null", "{", "{\"name\": \"Ann\"}", "\xff\xfe", "{\"role\": 4}",
+       R"({"role": "root", "code": "7K3M-9QXZ-4T2B-WN8C", "name": "Ann"})",
+       R"({"role": "observer", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["probe"]})",
+       R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["chainsaw"]})",
+       R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": [1]})",
+       R"({"role": "surgeon", "code": "7K3M-9QXZ-4T2B-WN8C", "tools": ["probe", "probe", "probe"]})",
+       R"({"role": "observer", "code": "7K3M-9QXZ-4T2B-WN8C", "token": "00"})"}) {
     const auto refusal = read(text, request);
     ASSERT_TRUE(refusal) << text;
     EXPECT_EQ(refusal->fault, JoinFault::Form) << text;

@@ -1,4 +1,4 @@
-// The copy of a session from which those who share a connection are given their pictures.
+// The copy of a session from which those who come late are shown everything.
 
 #include "server/watch/follow/session_copy.h"
 
@@ -67,16 +67,6 @@ News take(SessionCopy& copy, const Envelope& envelope) {
   return news.ok() ? *news : News::Nothing;
 }
 
-proto::SurfaceFrame read(const wire::SharedBytes& framed) {
-  Envelope envelope;
-  EXPECT_TRUE(wire::decode_envelope(BytesView(*framed).subspan(wire::kHeaderBytes), envelope).ok());
-  return envelope.surface_frame();
-}
-
-Bytes payload_of(const proto::SurfaceFrame& frame) {
-  return {frame.payload().begin(), frame.payload().end()};
-}
-
 // Adds levels of blood to a frame; `before`: those of its base.
 void bleed(Envelope& frame, const wire::BloodLevels& before, const wire::BloodLevels& levels) {
   auto& message = *frame.mutable_surface_frame();
@@ -96,13 +86,8 @@ TEST(SessionCopy, hands_blood_on_and_believes_no_wrong_levels) {
   auto second = session.frame(false);
   bleed(second, {0, 7, 0}, {1, 7, 200});
   EXPECT_EQ(take(copy, second), News::Frame);
-  for (const bool is_late : {true, false}) {
-    const auto given = read(is_late ? copy.keyframe() : copy.delta_from(session.number() - 1));
-    wire::BloodLevels levels = is_late ? wire::BloodLevels(3) : wire::BloodLevels{0, 7, 0};
-    ASSERT_TRUE(wire::decode_blood(bytes_of(std::string_view(given.blood())), levels).ok());
-    EXPECT_EQ(levels, (wire::BloodLevels{1, 7, 200}));
-    EXPECT_EQ(given.blood_crc(), wire::blood_crc(levels));
-  }
+  EXPECT_EQ(copy.newest()->blood, (wire::BloodLevels{1, 7, 200}));
+  EXPECT_EQ(copy.newest()->blood_crc, wire::blood_crc(copy.newest()->blood));
   auto wrong = session.frame(false);
   bleed(wrong, {1, 7, 200}, {2, 7, 200});
   wrong.mutable_surface_frame()->set_blood_crc(1);
@@ -110,43 +95,20 @@ TEST(SessionCopy, hands_blood_on_and_believes_no_wrong_levels) {
   EXPECT_TRUE(copy.needs_keyframe());
 }
 
-TEST(SessionCopy, shows_who_comes_late_the_newest_frame_whole) {
+TEST(SessionCopy, follows_the_frames_and_says_which_it_has) {
   Session session;
   SessionCopy copy;
   EXPECT_FALSE(copy.has_frame());
   EXPECT_EQ(take(copy, session.topology()), News::NewSurface);
   EXPECT_EQ(take(copy, session.frame(true)), News::Frame);
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(take(copy, session.frame(false)), News::Frame);
+  for (int i = 0; i < 80; ++i) EXPECT_EQ(take(copy, session.frame(false)), News::Frame);
   ASSERT_TRUE(copy.has_frame());
-  EXPECT_EQ(copy.frame(), session.number());
-  const auto whole = read(copy.keyframe());
-  QuantisedSurface shown(3);
-  ASSERT_TRUE(whole.is_keyframe());
-  ASSERT_TRUE(wire::decode_keyframe(payload_of(whole), shown).ok());
-  EXPECT_EQ(shown, session.surface());
-  EXPECT_EQ(copy.keyframe(), copy.keyframe()) << "it is encoded once";
-}
-
-TEST(SessionCopy, tells_the_difference_from_any_of_the_last_64_frames) {
-  Session session;
-  SessionCopy copy;
-  take(copy, session.topology());
-  take(copy, session.frame(true));
-  std::vector<QuantisedSurface> all(2);
-  all[1] = session.surface();
-  for (int i = 0; i < 80; ++i) {
-    take(copy, session.frame(false));
-    all.push_back(session.surface());
-  }
-  for (Frame base = session.number() - 63; base < session.number(); ++base) {
-    const auto delta = copy.delta_from(base);
-    ASSERT_TRUE(delta) << base;
-    auto shown = all[base];
-    ASSERT_TRUE(wire::decode_delta(payload_of(read(delta)), shown).ok());
-    EXPECT_EQ(shown, session.surface());
-  }
-  EXPECT_FALSE(copy.delta_from(session.number() - 64));
-  EXPECT_FALSE(copy.delta_from(session.number())) << "there is no difference from itself";
+  EXPECT_EQ(copy.newest()->frame, session.number());
+  EXPECT_EQ(copy.newest()->tick, 16 * session.number());
+  EXPECT_EQ(copy.newest()->surface, session.surface());
+  proto::FrameAck ack;
+  copy.acknowledge(ack);
+  EXPECT_EQ(ack.surface_crc(), wire::surface_crc(session.surface()));
 }
 
 TEST(SessionCopy, tells_who_comes_late_of_stage_pace_and_marks) {
@@ -241,8 +203,7 @@ TEST(SessionCopy, a_new_surface_makes_old_frames_useless) {
   take(copy, session.frame(false));
   take(copy, session.topology());
   EXPECT_FALSE(copy.has_frame());
-  take(copy, session.frame(true));
-  EXPECT_FALSE(copy.delta_from(session.number() - 1));
+  EXPECT_EQ(take(copy, session.frame(false)), News::Nothing) << "its base is of before";
 }
 
 TEST(SessionCopy, keeps_lists_and_lines_for_who_comes_late) {

@@ -14,10 +14,10 @@ namespace trocar::wasm {
 // How the screen lies in the world, and what mouse and keys do now: JavaScript writes this as one
 // array of floats. Flags are 0 or 1.
 struct PageHandInput {
-  Vec3f eye, right, up, forward;              // m; unit vectors
+  Vec3f eye, right, up, forward;                     // m; unit vectors
   float tan_half_height = 0, width = 0, height = 0;  // pixels
-  float x = 0, y = 0;                         // pixels
-  float wheel = 0;                            // notches, away from the person positive
+  float x = 0, y = 0;                                // pixels
+  float wheel = 0;                                   // notches, away from the person positive
   float is_over_scene = 0, left = 0, camera = 0, shift = 0, control = 0;
   float push = 0, grasp = 0, cut = 0, deeper = 0, nearer = 0, roll_left = 0, roll_right = 0;
 };

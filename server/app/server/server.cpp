@@ -327,7 +327,7 @@ Status Server::run() {
   signals_.async_wait([this](boost::system::error_code error, int signal) {
     if (!error) on_signal(signal);
   });
-  connections_->set_handler(*replicator_);
+  connections_->set_handler(replicator_->handler());
   tcp_->start(*connections_);
   if (!options_.ready_file.empty())
     if (const auto written =

@@ -460,7 +460,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     text.counter("session_messages_total", "Messages from sessions.", number(sessions.messages));
     text.counter("session_bytes_total", "Bytes of these.", number(sessions.bytes));
     text.counter("frames_skipped_total", "Frames left out for those who share a connection.",
-                 number(b.frames_skipped));
+                 number(b.frames.frames_skipped));
     text.counter("messages_down_total", "Messages to browsers.", number(b.messages_down));
     text.counter("bytes_down_total", "Bytes of these.", number(b.bytes_down));
     text.counter("messages_up_total", "Messages from browsers.", number(b.messages_up));

@@ -31,15 +31,17 @@ struct Speaker {
         hand_moments(options.max_hand_moments_per_second, options.clock_ns()),
         sayings(1, options.clock_ns()),
         strokes(10, options.clock_ns()),
-        changes(5, options.clock_ns()) {}
+        changes(5, options.clock_ns()),
+        reports(1, options.clock_ns()) {}
 
-  const net::ConnectionId id;                            // 0: there is no connection at present
-  access::Applicant applicant;                           // with the name of its Hello
+  const net::ConnectionId id;   // 0: there has been no connection to this server
+  bool is_guest = false;        // many share the connection
+  access::Applicant applicant;  // with the name of its Hello
   std::optional<participants::Participant> participant;  // set by Hello
   std::uint64_t pointed_ns = 0;                          // when it pointed last; 0: it does not
   std::uint64_t viewed_ns = 0;                           // when it said last where its view is
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;  // of samples
-  pacing::Allowance hand_moments, sayings, strokes, changes;              // that it may send
+  pacing::Allowance hand_moments, sayings, strokes, changes, reports;     // that it may send
 };
 
 class Audience {

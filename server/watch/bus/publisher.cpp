@@ -134,7 +134,7 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
     case News::Frame:
       break;
     case News::WholeFrame:
-      if (published_ == copy_->frame())
+      if (published_ == copy_->newest())
         publish({framed});
       else if (channel_->waiting_bytes() <= kBusyBytes)
         publish_frame(framed);
@@ -144,7 +144,7 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
       publish({framed});
       break;
     case News::LastFrame:
-      if (copy_->has_frame() && published_ != copy_->frame()) publish_frame(copy_->state());
+      if (copy_->has_frame() && published_ != copy_->newest()) publish_frame(copy_->state());
       barrier_ = framed;
       publish({framed});
       break;
@@ -157,8 +157,9 @@ void Publisher::pass_on(const proto::Envelope& message, const wire::SharedBytes&
 }
 
 void Publisher::publish_frame(const wire::SharedBytes& state) {
-  const auto frame = copy_->frame_from(published_);
-  published_ = copy_->frame();
+  encoder_.set_current(copy_->newest(), copy_->server_time_us(), state);
+  const auto frame = published_ ? encoder_.delta_from(*published_) : encoder_.keyframe();
+  published_ = copy_->newest();
   publish({frame, state});
 }
 
@@ -170,6 +171,7 @@ bool Publisher::is_active() const {
 
 void Publisher::publish(const std::vector<wire::SharedBytes>& messages) {
   ++number_;  // also of what is left out: who takes the stream asks for all then
+  answer_.clear();
   if (was_active_)
     send(subjects_.stream, joined(messages));
   else
@@ -219,8 +221,8 @@ void Publisher::take_ask(BytesView bytes, const std::string& answer_to) {
 void Publisher::answer_ping(const std::string& answer_to, std::uint64_t client_time_us) {
   const auto now = options_.clock_ns();
   if (channel_->waiting_bytes() > kMostBytesBeforePong || !pongs_.take_if_left(1, now)) return;
-  send(answer_to,
-       *wire::encode_pong(client_time_us, copy_->tick(), upstream_->server_time_us(now / 1000)));
+  send(answer_to, *wire::encode_pong(client_time_us, copy_->newest() ? copy_->newest()->tick : 0,
+                                     upstream_->server_time_us(now / 1000)));
 }
 
 // The picture in it is the one that the next difference is based on.
@@ -231,17 +233,16 @@ void Publisher::answer_all(const std::string& answer_to) {
       answered_.contains(answer_to) || !answers_.take_if_left(1, now))
     return;
   answered_[answer_to] = now;
-  if (published_ != copy_->frame()) publish_frame(copy_->state());
-  if (answer_.empty() || answer_number_ != number_) {
+  if (published_ != copy_->newest()) publish_frame(copy_->state());
+  if (answer_.empty()) {
     std::vector<wire::SharedBytes> all{welcome_};
     for (auto& message : copy_->all_but_frames()) all.push_back(std::move(message));
-    all.push_back(copy_->keyframe());
+    all.push_back(encoder_.keyframe());
     all.push_back(copy_->state());
     all.insert(all.end(), copy_->fine_parts().begin(), copy_->fine_parts().end());
     all.push_back(barrier_);
     all.push_back(goodbye_);
     answer_ = joined(all);
-    answer_number_ = number_;
   }
   send(answer_to, answer_);
 }

@@ -34,6 +34,7 @@
 
 #include "common/base/timing.h"
 #include "server/session/pacing/allowance.h"
+#include "server/session/replication/frame_encoder.h"
 #include "server/watch/bus/channel.h"
 #include "server/watch/bus/subjects.h"
 #include "server/watch/follow/session_copy.h"
@@ -109,9 +110,9 @@ class Publisher final : public follow::Upstream {
   wire::SharedBytes welcome_;            // null: not yet
   wire::SharedBytes barrier_, goodbye_;  // of the session's end; null: it goes on
   std::uint64_t number_ = 0;             // of the newest that went out
-  std::optional<Frame> published_;       // on which the next difference is based; empty: a keyframe
-  Bytes answer_;                         // to who asks for all; empty: not made
-  std::uint64_t answer_number_ = 0;      // of answer_
+  replication::FrameEncoder encoder_;
+  step::SharedFrame published_;          // on which the next difference is based; null: a keyframe
+  Bytes answer_;                         // to who asks for all, as of number_; empty: not made
   std::uint64_t other_ns_ = 0;           // when another publisher was heard
   bool was_active_ = false;              // as attend() has found it
   bool is_waiting_ = false;              // for another publisher, and the log says so

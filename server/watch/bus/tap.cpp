@@ -4,7 +4,6 @@
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/version.h"
 #include "common/secure/digest.h"
 #include "proto/wire.pb.h"
 
@@ -17,10 +16,6 @@ constexpr std::chrono::milliseconds kPeriod{100};
 constexpr std::uint64_t kFirstPauseNs = 500'000'000, kLongestPauseNs = 4'000'000'000;
 constexpr std::uint64_t kPingNs = 500'000'000;
 constexpr std::size_t kIdBytes = 8, kEarlyCostBytes = 64;  // of one that waits, beside it
-
-std::uint64_t to_ns(std::chrono::milliseconds time) {
-  return static_cast<std::uint64_t>(time.count()) * 1'000'000;
-}
 
 std::string random_id() {
   Bytes id(kIdBytes);
@@ -43,7 +38,8 @@ bool read_single_message(BytesView whole, proto::Envelope& message) {
 }  // namespace
 
 Tap::Tap(asio::any_io_executor executor, std::unique_ptr<Channel> channel, TapOptions options)
-    : channel_(std::move(channel)),
+    : Follower(options.clock_ns),
+      channel_(std::move(channel)),
       options_(std::move(options)),
       subjects_(options_.session),
       answers_(subjects_.answers_to(random_id())),
@@ -66,36 +62,27 @@ Status Tap::listen() {
 }
 
 void Tap::start(follow::UpstreamEvents events) {
-  events_ = std::move(events);
-  deadline_ns_ = now() + to_ns(options_.reach_deadline);
+  Follower::begin(std::move(events));
   ask_for_all();
   attend_often();
 }
 
 void Tap::stop() {
-  is_over_ = true;
-  events_ = {};
-  next_.cancel();
-}
-
-void Tap::end(EndReason reason, const std::string& text) {
-  if (is_over_) return;
-  const auto over = events_.over;
-  stop();
-  if (over) over(reason, text);
+  finish();
+  cut();
 }
 
 // ---- what comes ----
 
 void Tap::take_stream(BytesView bytes) {
-  if (is_over_) return;
+  if (is_over()) return;
   const auto piece = read_piece(bytes);
   if (!piece) {
     ++counters_.wrong;
     return;
   }
   if (is_following_) return take_piece(*piece);
-  if (was_welcome_ && piece->publisher == publisher_ && piece->pieces == 1)
+  if (was_welcome() && piece->publisher == publisher_ && piece->pieces == 1)
     note_goodbye(piece->bytes);
   early_.emplace_back(bytes.begin(), bytes.end());
   early_bytes_ += bytes.size() + kEarlyCostBytes;
@@ -107,7 +94,7 @@ void Tap::take_stream(BytesView bytes) {
 
 void Tap::take_piece(const Piece& piece) {
   if (piece.publisher != publisher_ || piece.number < number_) return;
-  followed_ns_ = now();
+  followed_ns_ = now_ns();
   bytes_ += kPieceHeaderBytes + piece.bytes.size();
   const bool is_sign = piece.pieces == 0;
   if (piece.number == number_) return;
@@ -120,11 +107,11 @@ void Tap::take_piece(const Piece& piece) {
   }
   if (!*whole) return;
   ++number_;
-  hand_on(**whole);
+  take_messages(**whole);
 }
 
 void Tap::take_answer(BytesView bytes) {
-  if (is_over_) return;
+  if (is_over()) return;
   const auto piece = read_piece(bytes);
   if (!piece || piece->pieces == 0) {
     ++counters_.wrong;
@@ -135,18 +122,18 @@ void Tap::take_answer(BytesView bytes) {
     return;
   }
   // Two may answer: the first one is heard to its end, unless it is silent.
-  const bool is_busy = answering_ != 0 && now() - asked_ns_ < pause_ns_;
+  const bool is_busy = answering_ != 0 && now_ns() - asked_ns_ < pause_ns_;
   if (piece->publisher != answering_ && (is_busy || piece->piece != 0)) return;
   answering_ = piece->publisher;
-  asked_ns_ = now();
+  asked_ns_ = now_ns();
   bytes_ += bytes.size();
   const auto whole = answer_.add(*piece);
   if (!whole || *whole) answering_ = 0;
-  if (whole && *whole) begin(*piece, **whole);
+  if (whole && *whole) take_all(*piece, **whole);
 }
 
 // Also answers to a Ping that was sent before count was lost come here: they begin with no Welcome.
-void Tap::begin(const Piece& last, BytesView whole) {
+void Tap::take_all(const Piece& last, BytesView whole) {
   const auto messages = split_messages(whole);
   proto::Envelope first;
   const bool is_all =
@@ -158,14 +145,14 @@ void Tap::begin(const Piece& last, BytesView whole) {
   publisher_ = last.publisher;
   number_ = last.number;
   stream_ = {};
-  followed_ns_ = now();
+  followed_ns_ = now_ns();
   goodbye_.reset();
   const auto early = std::exchange(early_, {});
   early_bytes_ = 0;
-  if (!hand_on(whole)) return;
+  if (!take_messages(whole)) return;
   pause_ns_ = kFirstPauseNs;
   for (const auto& bytes : early) {
-    if (!is_following_ || is_over_) return;
+    if (!is_following_ || is_over()) return;
     take_piece(*read_piece(bytes));
   }
 }
@@ -173,7 +160,7 @@ void Tap::begin(const Piece& last, BytesView whole) {
 void Tap::take_pong(BytesView whole) {
   proto::Envelope message;
   if (read_single_message(whole, message) && message.has_pong())
-    clock_.add(message.pong().client_time_us(), message.pong().server_time_us(), now() / 1000);
+    clock_.add(message.pong().client_time_us(), message.pong().server_time_us(), now_ns() / 1000);
 }
 
 void Tap::note_goodbye(BytesView whole) {
@@ -182,7 +169,7 @@ void Tap::note_goodbye(BytesView whole) {
     goodbye_ = printable(message.goodbye().text(), 200);
 }
 
-bool Tap::hand_on(BytesView whole) {
+bool Tap::take_messages(BytesView whole) {
   const auto messages = split_messages(whole);
   if (!messages) {
     ++counters_.wrong;
@@ -190,11 +177,11 @@ bool Tap::hand_on(BytesView whole) {
     return false;
   }
   return std::ranges::all_of(*messages, [this](BytesView framed) {
-    return hand_on_message(framed) && is_following_ && !is_over_;
+    return take_message(framed) && is_following_ && !is_over();
   });
 }
 
-bool Tap::hand_on_message(BytesView framed) {
+bool Tap::take_message(BytesView framed) {
   const auto body = framed.subspan(wire::kHeaderBytes);
   proto::Envelope message;
   auto taken = wire::decode_envelope(body, message);
@@ -203,19 +190,11 @@ bool Tap::hand_on_message(BytesView framed) {
     return false;
   }
   if (taken && message.has_welcome()) {
-    if (message.welcome().protocol_major() != kProtocolMajor) {
-      end(EndReason::Version, "the publisher speaks another protocol: use programs of one release");
-      return false;
-    }
-    is_welcome_ = true;
     clock_ = {};  // it may be another publisher's server, or one that began anew
     pinged_ns_ = 0;
-    if (std::exchange(was_welcome_, true)) ++returns_;
-    if (const auto welcome = events_.welcome) welcome(message.welcome());
-    return true;
+    return take_welcome(message.welcome());
   }
-  const auto hand_over = events_.message;  // a copy: it may stop this
-  if (taken && hand_over) taken = hand_over(message, wire::frame_body(body));
+  if (taken) taken = hand_on(message, wire::frame_body(body));
   if (taken) return true;
   ++counters_.wrong;
   lose_count(printable(taken.error().message, 200));
@@ -228,11 +207,11 @@ void Tap::lose_count(const std::string& why) {
   if (!std::exchange(is_following_, false)) return;
   log::debug("{}: asks for everything, because {}", name(), why);
   why_ = why;
-  if (now() - asked_ns_ >= kFirstPauseNs) ask_for_all();
+  if (now_ns() - asked_ns_ >= kFirstPauseNs) ask_for_all();
 }
 
 void Tap::ask_for_all() {
-  asked_ns_ = now();
+  asked_ns_ = now_ns();
   pause_ns_ = std::clamp(2 * pause_ns_, kFirstPauseNs, kLongestPauseNs);
   answering_ = 0;
   ++counters_.asks;
@@ -251,17 +230,13 @@ void Tap::say(const proto::Envelope& message) {
 }
 
 void Tap::attend() {
-  if (is_over_) return;
-  const auto time = now();
-  if (is_following_ && time - followed_ns_ > to_ns(options_.silence))
-    lose_count("its publisher is silent");
-  if (is_welcome_ && time - followed_ns_ > to_ns(options_.silence)) {
-    is_welcome_ = false;
-    deadline_ns_ = time + to_ns(options_.return_deadline);
-    log::warn("{} stands still ({}): asking for it", name(), why_);
-    if (const auto lost = events_.lost) lost(why_);
+  if (is_over()) return;
+  const auto time = now_ns();
+  if (time - followed_ns_ > kSilenceNs) {
+    if (is_following_) lose_count("its publisher is silent");
+    lose(why_);
   }
-  if (!is_welcome_ && time >= deadline_ns_) return end(EndReason::ServerClosing, why_);
+  if (is_too_late()) return end(EndReason::ServerClosing, why_);
   if (!is_following_ && time - asked_ns_ >= pause_ns_ - pause_ns_ / 1000 * shortened_) {
     if (goodbye_) return end(EndReason::ServerClosing, *goodbye_);
     ask_for_all();
@@ -277,7 +252,7 @@ void Tap::attend() {
 
 void Tap::attend_often() {
   attend();
-  if (is_over_) return;
+  if (is_over()) return;
   next_.expires_after(kPeriod);
   next_.async_wait([this](boost::system::error_code error) {
     if (!error) attend_often();

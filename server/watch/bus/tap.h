@@ -23,7 +23,6 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <chrono>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -34,15 +33,12 @@
 #include "server/watch/bus/channel.h"
 #include "server/watch/bus/piece.h"
 #include "server/watch/bus/subjects.h"
-#include "server/watch/follow/upstream.h"
+#include "server/watch/follow/follower.h"
 
 namespace trocar::bus {
 
 struct TapOptions {
-  std::string session;                                 // is_session_name()
-  std::chrono::milliseconds reach_deadline{15'000};    // for the first Welcome
-  std::chrono::milliseconds return_deadline{600'000};  // for each later one
-  std::chrono::milliseconds silence{3000};
+  std::string session;  // is_session_name()
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
 };
 
@@ -52,7 +48,7 @@ struct TapCounters {
   std::uint64_t wrong = 0;  // messages that cannot be right
 };
 
-class Tap final : public follow::Upstream {
+class Tap final : public follow::Follower {
  public:
   static constexpr std::size_t kMostEarlyBytes = 16 * 1024 * 1024;
 
@@ -69,29 +65,26 @@ class Tap final : public follow::Upstream {
   void attend();
 
   std::string name() const override;
-  bool is_welcome() const override { return is_welcome_; }
   std::uint64_t server_time_us(std::uint64_t now_us) const override { return clock_.at(now_us); }
   std::uint64_t bytes_received() const override { return bytes_; }
-  std::uint64_t returns() const override { return returns_; }
   const TapCounters& counters() const { return counters_; }
 
  private:
   void take_stream(BytesView bytes);
   void take_piece(const Piece& piece);
   void take_answer(BytesView bytes);
-  void begin(const Piece& last, BytesView whole);
+  void take_all(const Piece& last, BytesView whole);
   // False: nothing more is to be read of what the publisher says.
-  bool hand_on(BytesView whole);
-  bool hand_on_message(BytesView framed);
+  bool take_messages(BytesView whole);
+  bool take_message(BytesView framed);
   void take_pong(BytesView whole);
   void note_goodbye(BytesView whole);
   // Nothing fits any more until all has come anew.
   void lose_count(const std::string& why);
   void ask_for_all();
   void ask(const proto::Envelope& question);
-  void end(wire::EndReason reason, const std::string& text);
+  void cut() override { next_.cancel(); }
   void attend_often();
-  std::uint64_t now() const { return options_.clock_ns(); }
 
   const std::unique_ptr<Channel> channel_;
   const TapOptions options_;
@@ -99,7 +92,6 @@ class Tap final : public follow::Upstream {
   const std::string answers_;      // the subject for answers to this
   const std::uint64_t shortened_;  // thousandths by which its pauses are shorter
   asio::steady_timer next_;
-  follow::UpstreamEvents events_;
   wire::ServerClock clock_;
 
   bool is_following_ = false;
@@ -109,14 +101,13 @@ class Tap final : public follow::Upstream {
   std::size_t early_bytes_ = 0;
   std::uint64_t answering_ = 0;  // the publisher whose answer comes; 0: of none
 
-  bool is_welcome_ = false, was_welcome_ = false, is_over_ = false;
   std::string why_;
   // Says what the publisher that it has followed said at its end while this asked, if anything.
   std::optional<std::string> goodbye_;
-  std::uint64_t followed_ns_ = 0, asked_ns_ = 0, pinged_ns_ = 0, deadline_ns_ = 0;
+  std::uint64_t followed_ns_ = 0, asked_ns_ = 0, pinged_ns_ = 0;
   std::uint64_t pause_ns_ = 0;  // from one question to the next
   std::uint32_t watchers_ = 0;
-  std::uint64_t bytes_ = 0, returns_ = 0;
+  std::uint64_t bytes_ = 0;
   TapCounters counters_;
 };
 

@@ -32,7 +32,7 @@ namespace trocar::follow {
 
 struct ConversationOptions {
   std::chrono::milliseconds ping_interval{1000};
-  std::chrono::milliseconds silence{0};  // ends it; 0: none does
+  std::chrono::nanoseconds silence{0};  // ends it; 0: none does
 };
 
 class Conversation {

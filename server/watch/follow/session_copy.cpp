@@ -83,7 +83,7 @@ bool SessionCopy::needs_keyframe() {
 void SessionCopy::acknowledge(proto::FrameAck& ack) const {
   ack.set_frame(static_cast<std::uint32_t>(current_->frame));
   ack.set_surface_crc(current_->surface_crc);
-  if (!current_->blood.empty()) ack.set_blood_crc(wire::blood_crc(current_->blood));
+  if (!current_->blood.empty()) ack.set_blood_crc(current_->blood_crc);
 }
 
 void SessionCopy::lose_count() {
@@ -111,14 +111,14 @@ bool SessionCopy::take_change(const proto::SurfaceChange& message) {
   return is_applied;
 }
 
-const SessionCopy::Kept* SessionCopy::find(Frame frame) const {
+const step::PublishedFrame* SessionCopy::find(Frame frame) const {
   const auto& kept = kept_[frame % kKeptFrames];
   return kept && kept->frame == frame ? kept.get() : nullptr;
 }
 
 bool SessionCopy::take_frame(const proto::SurfaceFrame& message) {
   if (!has_layout_ || (!message.is_keyframe() && current_ == nullptr)) return false;
-  auto next = std::make_shared<Kept>();
+  auto next = std::make_shared<step::PublishedFrame>();
   const Bytes payload(message.payload().begin(), message.payload().end());
   bool is_decoded = false;
   if (message.epoch() == layout_.epoch && message.is_keyframe()) {
@@ -140,17 +140,17 @@ bool SessionCopy::take_frame(const proto::SurfaceFrame& message) {
   next->tick = message.tick();
   next->epoch = message.epoch();
   next->surface_crc = message.surface_crc();
-  next->server_time_us = message.server_time_us();
-  current_ = next;
-  kept_[next->frame % kKeptFrames] = std::move(next);
+  next->blood_crc = message.blood_crc();
+  server_time_us_ = message.server_time_us();
+  current_ = std::move(next);
+  kept_[current_->frame % kKeptFrames] = current_;
   wants_keyframe_ = has_asked_ = false;
-  keyframe_.reset();
   state_.reset();
-  deltas_.clear();
   return true;
 }
 
-bool SessionCopy::take_blood(const proto::SurfaceFrame& message, const Kept* base, Kept& next) {
+bool SessionCopy::take_blood(const proto::SurfaceFrame& message, const step::PublishedFrame* base,
+                             step::PublishedFrame& next) {
   if (!message.has_blood()) return true;
   if (base != nullptr) next.blood = base->blood;
   next.blood.resize(next.surface.size(), 0);
@@ -177,53 +177,6 @@ Result<News> SessionCopy::take_fine_part(const proto::FineSurfacePart& message,
   is_fine_whole_ = *added;
   fine_parts_.push_back(framed);
   return News::FinePart;
-}
-
-wire::SharedBytes SessionCopy::wrap(const Kept* base, const Bytes& payload) const {
-  proto::Envelope envelope;
-  auto& message = *envelope.mutable_surface_frame();
-  message.set_frame(current_->frame);
-  message.set_tick(current_->tick);
-  message.set_epoch(current_->epoch);
-  message.set_is_keyframe(base == nullptr);
-  if (base != nullptr) message.set_base_frame(base->frame);
-  message.set_payload(payload.data(), payload.size());
-  message.set_surface_crc(current_->surface_crc);
-  message.set_server_time_us(current_->server_time_us);
-  if (!current_->blood.empty()) {
-    Bytes blood;
-    wire::encode_blood(base != nullptr ? BytesView(base->blood) : BytesView(), current_->blood,
-                       blood);
-    message.set_blood(blood.data(), blood.size());
-    message.set_blood_crc(wire::blood_crc(current_->blood));
-  }
-  return wire::encode_envelope(envelope);
-}
-
-wire::SharedBytes SessionCopy::keyframe() {
-  if (keyframe_) return keyframe_;
-  Bytes payload;
-  wire::encode_keyframe(current_->surface, payload);
-  keyframe_ = wrap(nullptr, payload);
-  return keyframe_;
-}
-
-wire::SharedBytes SessionCopy::frame_from(std::optional<Frame> base) {
-  auto message = base ? delta_from(*base) : nullptr;
-  return message ? message : keyframe();
-}
-
-wire::SharedBytes SessionCopy::delta_from(Frame base) {
-  const auto* from = find(base);
-  if (from == nullptr || base >= current_->frame) return nullptr;
-  auto& cached = deltas_[base];
-  if (cached) return cached;
-  Bytes payload;
-  auto surface = from->surface;
-  surface.resize(current_->surface.size());
-  wire::encode_delta(surface, current_->surface, payload);
-  cached = wrap(from, payload);
-  return cached;
 }
 
 const wire::SharedBytes& SessionCopy::topology() {

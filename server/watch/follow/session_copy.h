@@ -1,24 +1,22 @@
 #pragma once
 
 // A session's surface and lists as its messages tell them, so that somebody who comes late is shown
-// everything at once, and somebody who is slow gets a difference from what he has instead of all
-// that came since. (The replica of a client, without what a picture needs.)
+// everything at once. (The replica of a client, without what a picture needs.) A frame is the
+// server's own, of which who watches needs no more: its tools and figures are in its FrameState.
 //
-// The last 64 frames are kept. What goes to several is encoded once. Outside data: a message that
-// does not fit makes the copy wait for a keyframe, which needs_keyframe() says once; a message that
-// cannot be right is an error. Thread: one.
+// The last 64 frames are kept. Outside data: a message that does not fit makes the copy wait for a
+// keyframe, which needs_keyframe() says once; a message that cannot be right is an error.
+// Thread: one.
 
 #include <array>
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "common/base/tick.h"
-#include "common/wire/blood_codec.h"
 #include "common/wire/fine_surface.h"
 #include "common/wire/framing.h"
 #include "common/wire/surface_layout.h"
+#include "server/tissue/step/published_frame.h"
 
 namespace trocar::proto {
 class Drawing;
@@ -56,25 +54,14 @@ class SessionCopy {
 
   // There is a frame, and it is of the surface as it was told last.
   bool has_frame() const { return current_ != nullptr && current_->epoch == layout_.epoch; }
-  // These are of the newest frame.
-  Frame frame() const { return current_->frame; }
-  Tick tick() const { return current_ ? current_->tick : 0; }
-  std::uint32_t epoch() const { return current_->epoch; }
-  std::uint64_t server_time_us() const { return current_->server_time_us; }
-  std::uint32_t surface_crc() const { return current_->surface_crc; }
-  const wire::QuantisedSurface& surface() const { return current_->surface; }
+  // Only where there is a frame; before, null.
+  const step::SharedFrame& newest() const { return current_; }
+  std::uint64_t server_time_us() const { return server_time_us_; }  // of the newest frame
   // Says that the newest frame is here whole.
   void acknowledge(proto::FrameAck& ack) const;
-  // Empty where the session does not bleed.
-  const wire::BloodLevels& blood() const { return current_->blood; }
   // The session's last, once it has said that.
   std::optional<Frame> last_frame() const { return last_frame_; }
-  wire::SharedBytes keyframe();
-  // The newest frame as a difference from `base`, or whole where there is no way from that.
-  wire::SharedBytes frame_from(std::optional<Frame> base);
-  // Null: `base` is not kept, or it is of another surface.
-  wire::SharedBytes delta_from(Frame base);
-  // FrameState; null: it has not come yet.
+  // FrameState of the newest frame; null: it has not come yet.
   const wire::SharedBytes& state() const { return state_; }
 
   // For who comes late, before the first frame: participants, surface, recording, drawing, pace,
@@ -87,16 +74,9 @@ class SessionCopy {
 
  private:
   static constexpr std::size_t kKeptFrames = 64;
-  struct Kept {
-    Frame frame = 0;
-    Tick tick = 0;
-    std::uint32_t epoch = 0, surface_crc = 0;
-    std::uint64_t server_time_us = 0;
-    wire::QuantisedSurface surface;
-    wire::BloodLevels blood;  // empty: the session does not bleed
-  };
   // Fills the blood of `next` from that of its base (null: dry); false: the message is wrong.
-  static bool take_blood(const proto::SurfaceFrame& message, const Kept* base, Kept& next);
+  static bool take_blood(const proto::SurfaceFrame& message, const step::PublishedFrame* base,
+                         step::PublishedFrame& next);
 
   Status take_topology(const proto::SurfaceTopology& message);
   bool take_change(const proto::SurfaceChange& message);
@@ -104,17 +84,16 @@ class SessionCopy {
   void take_drawing(const proto::Drawing& message);
   Result<News> take_fine_part(const proto::FineSurfacePart& message,
                               const wire::SharedBytes& framed);
-  const Kept* find(Frame frame) const;
+  const step::PublishedFrame* find(Frame frame) const;
   void lose_count();
-  wire::SharedBytes wrap(const Kept* base, const Bytes& payload) const;
 
   wire::SurfaceLayout layout_;
   bool has_layout_ = false, wants_keyframe_ = false, has_asked_ = false;
   std::string organ_name_;
-  std::array<std::shared_ptr<Kept>, kKeptFrames> kept_;  // by frame number
-  std::shared_ptr<Kept> current_;                        // null: waits for a keyframe
-  wire::SharedBytes topology_, keyframe_, state_;        // null: not encoded, or not there
-  std::map<Frame, wire::SharedBytes> deltas_;            // by base
+  std::array<step::SharedFrame, kKeptFrames> kept_;  // by frame number
+  step::SharedFrame current_;                        // null: waits for a keyframe
+  std::uint64_t server_time_us_ = 0;
+  wire::SharedBytes topology_, state_;  // null: not encoded, or not there
   wire::SharedBytes participants_, recording_, pace_, marks_, stage_, view_;
   std::unique_ptr<proto::Drawing> drawing_;
   wire::FinePartOrder fine_order_;

@@ -18,46 +18,34 @@ using wire::EndReason;
 constexpr int kMostNames = 9;
 constexpr std::chrono::milliseconds kPingInterval{500}, kFirstPause{200}, kLongestPause{2000};
 
-std::uint64_t ns_of(std::chrono::milliseconds time) {
-  return static_cast<std::uint64_t>(time.count()) * 1'000'000;
-}
-
 }  // namespace
 
 Uplink::Uplink(asio::any_io_executor executor, UplinkOptions options)
-    : executor_(std::move(executor)),
+    : Follower(monotonic_ns),
+      executor_(std::move(executor)),
       options_(std::move(options)),
       sessions_({options_.server}),
-      conversation_(executor_, sessions_,
-                    {.ping_interval = kPingInterval, .silence = options_.silence},
-                    [this](const auto& message, const auto& body) { return take(message, body); }),
+      conversation_(
+          executor_, sessions_,
+          {.ping_interval = kPingInterval, .silence = std::chrono::nanoseconds(kSilenceNs)},
+          [this](const auto& message, const auto& body) { return take(message, body); }),
       pause_(executor_) {}
 
 Uplink::~Uplink() = default;
 
 void Uplink::start(UpstreamEvents events) {
-  events_ = std::move(events);
-  deadline_ns_ = monotonic_ns() + ns_of(options_.reach_deadline);
+  begin(std::move(events));
   spawn(executor_, run(), [](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void Uplink::stop() {
-  if (is_over_) return;
-  is_over_ = true;
-  events_ = {};
+  if (!finish()) return;
   pause_.cancel();
-  if (!is_welcome_) return conversation_.cut();
+  if (!is_welcome()) return cut();
   proto::Envelope bye;
   bye.mutable_bye()->set_reason("the relay ends");
   say(bye);
   conversation_.finish();
-}
-
-void Uplink::end(EndReason reason, const std::string& text) {
-  if (is_over_) return;
-  is_over_ = true;
-  conversation_.cut();
-  if (const auto over = std::exchange(events_, {}).over) over(reason, text);
 }
 
 std::string Uplink::name_there() const {
@@ -67,9 +55,9 @@ std::string Uplink::name_there() const {
 // Coroutines here hold no temporaries across a co_await: GCC 12 miscompiles some of them otherwise.
 asio::awaitable<void> Uplink::run() {
   Backoff pause(kFirstPause, kLongestPause, 1.5);
-  while (!is_over_) {
+  while (!is_over()) {
     const bool is_open = co_await conversation_.open(options_.server);
-    if (is_over_) break;
+    if (is_over()) break;
     if (is_open && conversation_.code() != options_.code.certificate) {
       end(EndReason::CodeWrong, options_.server.name +
                                     " is not the server of this join code: check the code's first "
@@ -82,16 +70,10 @@ asio::awaitable<void> Uplink::run() {
     } else {
       say_waiting();
     }
-    if (is_over_) break;
-    const auto& why = conversation_.why();
-    if (std::exchange(is_welcome_, false)) {
-      deadline_ns_ = monotonic_ns() + ns_of(options_.return_deadline);
-      pause.restart();
-      log::warn("the connection to {} broke ({}): trying again", options_.server.name, why);
-      if (events_.lost) events_.lost(why);
-    }
-    if (monotonic_ns() >= deadline_ns_) {
-      end(EndReason::ServerClosing, why);
+    if (is_over()) break;
+    if (lose(conversation_.why())) pause.restart();
+    if (is_too_late()) {
+      end(EndReason::ServerClosing, conversation_.why());
       break;
     }
     pause_.expires_after(pause.next());
@@ -101,9 +83,9 @@ asio::awaitable<void> Uplink::run() {
 
 // Once, and not to who was in the session before.
 void Uplink::say_waiting() {
-  if (was_welcome_ || std::exchange(has_said_waiting_, true)) return;
+  if (was_welcome() || std::exchange(has_said_waiting_, true)) return;
   log::info("no server at {} yet ({}): trying for {} s", options_.server.name, conversation_.why(),
-            std::chrono::ceil<std::chrono::seconds>(options_.reach_deadline).count());
+            kReachNs / 1'000'000'000);
 }
 
 void Uplink::say_hello() {
@@ -115,27 +97,15 @@ void Uplink::say_hello() {
 
 bool Uplink::take(const proto::Envelope& message, const Bytes& body) {
   if (message.has_welcome()) {
-    if (message.welcome().protocol_major() != kProtocolMajor) {
-      end(EndReason::Version, "the server speaks another protocol: use programs of one release");
-      return false;
-    }
-    take_welcome(message.welcome());
-    return true;
+    token_ = message.welcome().return_token();
+    conversation_.begin_pings();
+    return take_welcome(message.welcome());
   }
   if (message.has_goodbye()) return take_goodbye(message.goodbye());
-  const auto hand_on = events_.message;  // a copy: it may stop this
-  if (!is_welcome_ || !hand_on) return true;
+  if (!is_welcome()) return true;
   const auto taken = hand_on(message, wire::frame_body(body));
   if (!taken) conversation_.explain(printable(taken.error().message, 200));
   return taken.ok();
-}
-
-void Uplink::take_welcome(const proto::Welcome& welcome) {
-  is_welcome_ = true;
-  if (std::exchange(was_welcome_, true)) ++returns_;
-  token_ = welcome.return_token();
-  conversation_.begin_pings();
-  if (const auto hand_on = events_.welcome) hand_on(welcome);
 }
 
 // Returns false always. Reasons that end this connection alone are no end of the session.
@@ -151,11 +121,11 @@ bool Uplink::take_goodbye(const proto::Goodbye& goodbye) {
     case proto::GOODBYE_TOO_MANY_TRIES:
       return false;
     case proto::GOODBYE_PROTOCOL_ERROR:
-      if (is_welcome_) return false;
+      if (is_welcome()) return false;
       break;
     case proto::GOODBYE_FULL:
     case proto::GOODBYE_CLOSED:
-      if (was_welcome_) return false;
+      if (was_welcome()) return false;
       break;
     default:
       break;

@@ -24,12 +24,11 @@
 #include "common/wire/framing.h"
 #include "common/wire/session_messages.h"
 #include "server/watch/follow/conversation.h"
-#include "server/watch/follow/upstream.h"
+#include "server/watch/follow/follower.h"
 
 namespace trocar::proto {
 class Envelope;
 class Goodbye;
-class Welcome;
 }  // namespace trocar::proto
 
 namespace trocar::follow {
@@ -37,13 +36,10 @@ namespace trocar::follow {
 struct UplinkOptions {
   SessionAddress server;
   secure::JoinCode code;
-  std::string name;                                    // 1 to 29 bytes, so that a number fits
-  std::chrono::milliseconds reach_deadline{15'000};    // for the first Welcome
-  std::chrono::milliseconds return_deadline{600'000};  // for each later one
-  std::chrono::milliseconds silence{3000};
+  std::string name;  // 1 to 29 bytes, so that a number fits
 };
 
-class Uplink final : public Upstream {
+class Uplink final : public Follower {
  public:
   Uplink(asio::any_io_executor executor, UplinkOptions options);
   ~Uplink() override;
@@ -54,34 +50,28 @@ class Uplink final : public Upstream {
   void say(const proto::Envelope& message) override { conversation_.say(message); }
 
   std::string name() const override { return options_.server.name; }
-  bool is_welcome() const override { return is_welcome_; }
   std::uint64_t server_time_us(std::uint64_t now_us) const override {
     return conversation_.clock().at(now_us);
   }
   std::uint64_t bytes_received() const override { return sessions_.bytes; }
-  std::uint64_t returns() const override { return returns_; }
 
  private:
   asio::awaitable<void> run();
+  void cut() override { conversation_.cut(); }
   void say_hello();
   void say_waiting();
   // False: nothing more is to be read.
   bool take(const proto::Envelope& message, const Bytes& body);
   bool take_goodbye(const proto::Goodbye& goodbye);
-  void take_welcome(const proto::Welcome& welcome);
-  void end(wire::EndReason reason, const std::string& text);
   std::string name_there() const;
 
   asio::any_io_executor executor_;
   const UplinkOptions options_;
-  UpstreamEvents events_;
   Sessions sessions_;
   Conversation conversation_;
   std::string token_;
-  bool is_welcome_ = false, was_welcome_ = false, is_over_ = false;
   bool has_said_waiting_ = false;
   int number_ = 1;
-  std::uint64_t returns_ = 0, deadline_ns_ = 0;
   asio::steady_timer pause_;
 };
 

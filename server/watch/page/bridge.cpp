@@ -8,12 +8,13 @@ Bridge::Bridge(std::vector<follow::SessionAddress> known, int most_connections,
       observers(access::places_for_observers(most_connections),
                 access::places_for_observers(most_connections_per_address)) {}
 
-std::shared_ptr<Carrier> Bridge::carrier_of(const follow::SessionAddress& session,
+std::shared_ptr<Carrier> Bridge::carrier_of(const follow::SessionAddress& session, wire::Role role,
                                             const asio::any_io_executor& executor) {
+  const bool is_shared = role == wire::Role::Observer;
   auto& place = carriers_[session.name];
-  if (auto carrier = place.lock(); carrier && !carrier->has_ended()) return carrier;
+  if (auto carrier = place.lock(); is_shared && carrier && !carrier->has_ended()) return carrier;
   auto carrier = std::make_shared<Carrier>(executor, sessions, counters, session);
-  place = carrier;
+  if (is_shared) place = carrier;
   carrier->start();
   return carrier;
 }

@@ -26,8 +26,9 @@ class Bridge {
   Bridge(std::vector<follow::SessionAddress> known, int most_connections,
          int most_connections_per_address);
 
-  // The connection that those who only watch share; a new one if the last has ended.
-  std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session,
+  // The connection that those who only watch share, a new one if the last has ended; or one for an
+  // instructor alone.
+  std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session, wire::Role role,
                                       const asio::any_io_executor& executor);
 
   follow::Sessions sessions;

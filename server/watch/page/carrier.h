@@ -1,18 +1,17 @@
 #pragma once
 
-// One connection to a session for all who only watch it through this program. What is for everybody
-// crosses it once (GuestMessage in proto/wire.proto) and is kept in a copy of the session, from
-// which each seat is given what its browser can take.
+// One connection to a session for all who only watch it through this program; whoever leads or
+// holds instruments is alone on his. What is for everybody crosses it once (GuestMessage in
+// proto/wire.proto) and is shown to each seat as its browser takes it (server/watch/crowd/show.h):
+// to that, a seat is a connection, by its number.
 //
-//   session --frames, events--> Carrier --> SessionCopy --newest frame, by each one's own base-->
-//   seats
-//           --for one guest--> Carrier -----------------------------------------------------> seat
-//           <--acknowledgements, pings, what a guest says-- Carrier <-------------------------
-//           seats
+//   session --frames, events--> Carrier --> Show --what this one can take--> seats
+//           --for one guest--> Carrier ------------------------------------> seat
+//           <--acknowledgements, pings, what a guest says-- Carrier <------- seats
 //
 // It begins with the first seat and ends with the last, or when the session closes it: then every
 // seat is told, and the next one begins another. Bounds: what goes up waits for room, one message
-// of each seat. Thread: that of its executor.
+// of each seat. The browser may send 600 messages a second. Thread: that of its executor.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -24,14 +23,14 @@
 #include <optional>
 #include <string>
 
+#include "server/session/net/connections.h"
+#include "server/watch/crowd/show.h"
 #include "server/watch/follow/conversation.h"
-#include "server/watch/follow/session_copy.h"
 #include "server/watch/page/page_counters.h"
 
 namespace trocar::proto {
-class Envelope;
 class Goodbye;
-class Welcome;
+class GuestMessage;
 }  // namespace trocar::proto
 
 namespace trocar::page {
@@ -41,21 +40,28 @@ class Carried {
  public:
   virtual ~Carried() = default;
   // Takes a message for this one alone.
-  virtual void take(BytesView envelope, bool is_last) = 0;
-  // Hears a message that is for everybody.
-  virtual void hear(follow::News news, const wire::SharedBytes& framed) = 0;
+  virtual void take(const proto::Envelope& message) = 0;
+  // Hears that nothing more comes for this one.
+  virtual void finish_after_words() = 0;
+  // Queues a framed message; false: there is no room.
+  virtual bool tell(const wire::SharedBytes& framed) = 0;
+  virtual std::size_t waiting_bytes() const = 0;
+  // Hears that its browser has to begin anew.
+  virtual void cut_off(const std::string& why) = 0;
   // Hears that the carrier has ended.
   virtual void lose() = 0;
   // Returns its place in the session, or none yet.
   virtual std::uint32_t slot() const = 0;
 };
 
-class Carrier : public std::enable_shared_from_this<Carrier> {
+class Carrier final : private net::Connections,
+                      private crowd::Show,
+                      public std::enable_shared_from_this<Carrier> {
  public:
   // `sessions` and `counters` outlive this.
   Carrier(asio::any_io_executor executor, follow::Sessions& sessions, PageCounters& counters,
           follow::SessionAddress session);
-  ~Carrier();
+  ~Carrier() override;
   void start();
 
   // False: it has ended, and why() says why.
@@ -69,21 +75,38 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   void remove(std::uint32_t number);
   // Waits for room. `envelope` empty: nothing but that this was the last. False: it has ended.
   asio::awaitable<bool> say(std::uint32_t number, BytesView envelope, bool is_last);
-
-  // Other addresses of the session, as its Welcome to a seat names them.
-  void note_further(const proto::Welcome& welcome);
-
-  follow::SessionCopy& copy() { return copy_; }
-  const wire::ServerClock& clock() const { return conversation_.clock(); }
+  // Takes what a seat that is welcome says, after such a wait. It may be cut off for that.
+  asio::awaitable<bool> heed_page(std::uint32_t number, BytesView envelope);
 
  private:
   enum class State { Reaching, Open, Ended };
 
   asio::awaitable<void> run();
-  bool take(const proto::Envelope& message, const Bytes& body);
+  bool take_any(const proto::Envelope& message, const Bytes& body);
+  void take_for_guest(const proto::GuestMessage& guest);
   void say_goodbye(const proto::Goodbye& goodbye);
-  bool spread(const proto::Envelope& message, const wire::SharedBytes& framed);
+  void say_for(std::uint32_t number, BytesView envelope, bool is_last);
+  void attend();
   void end();
+
+  std::optional<replication::Ending> heed(replication::Viewer& who,
+                                          const proto::Envelope& message) override;
+  std::optional<replication::Ending> heed_samples(const replication::Viewer&,
+                                                  const proto::ClientDatagram&) override {
+    return std::nullopt;  // there are no datagrams
+  }
+  void note_shown(const replication::Viewer& who, const proto::FrameAck& ack) override;
+  std::uint64_t server_time_us() const override;
+  void forget(const replication::Viewer& who, const replication::Ending* ending) override;
+  net::ConnectionId but(const proto::Envelope& message) const override;
+
+  bool send(net::ConnectionId seat, wire::SharedBytes framed) override;
+  bool has_datagrams(net::ConnectionId) const override { return false; }
+  bool send_datagram(net::ConnectionId, BytesView) override { return false; }
+  std::size_t outstanding_bytes(net::ConnectionId seat) const override;
+  std::string peer_address(net::ConnectionId) const override { return {}; }
+  void close_after_flush(net::ConnectionId, wire::SharedBytes) override {}  // see forget()
+  void close(net::ConnectionId) override {}
 
   asio::any_io_executor executor_;
   follow::Sessions& sessions_;
@@ -93,10 +116,10 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   State state_ = State::Reaching;
   bool is_carrying_ = false;  // a guest is welcome
   std::string why_;
-  follow::SessionCopy copy_;
-  std::map<std::uint32_t, Carried*> seats_;
+  std::map<net::ConnectionId, Carried*> seats_;
   std::uint32_t next_number_ = 1;
   asio::steady_timer changed_;  // cancelled to wake who waits for it to be open
+  asio::steady_timer attention_;
 };
 
 }  // namespace trocar::page

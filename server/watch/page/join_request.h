@@ -30,8 +30,8 @@ struct JoinRequest {
   std::string name;
   wire::Role role = wire::Role::Observer;
   std::vector<tool::ToolShape> tools;  // none for a role without
-  std::string session;  // empty: the first
-  Bytes return_token;   // empty, or 16 bytes
+  std::string session;                 // empty: the first
+  Bytes return_token;                  // empty, or 16 bytes
 };
 
 enum class JoinFault { Form, Code };  // Code counts as a try

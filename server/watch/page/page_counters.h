@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "server/session/replication/replicator_options.h"
+
 namespace trocar::page {
 
 struct PageCounters {
@@ -14,9 +16,9 @@ struct PageCounters {
   std::uint64_t unreachable = 0;                    // sessions
   std::uint64_t messages_down = 0, bytes_down = 0;  // to browsers
   std::uint64_t messages_up = 0, bytes_up = 0;
-  std::uint64_t frames_skipped = 0;  // summed over those who share a carrier
-  std::size_t watchers = 0;          // now
-  std::size_t carriers = 0;          // connections that many share, now
+  replication::ReplicatorCounters frames;  // summed over those who share a carrier
+  std::size_t watchers = 0;                // now
+  std::size_t carriers = 0;                // connections that many share, now
 };
 
 }  // namespace trocar::page

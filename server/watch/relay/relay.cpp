@@ -113,7 +113,7 @@ Status Relay::open(std::size_t topology_bytes) {
   crowd.say_up = [this](const proto::Envelope& message) { upstream_->say(message); };
   crowd.server_time_us = [this](std::uint64_t now_us) { return upstream_->server_time_us(now_us); };
   crowd_ = std::make_unique<crowd::Crowd>(*connections_, std::move(crowd));
-  connections_->set_handler(*crowd_);
+  connections_->set_handler(crowd_->handler());
   return {};
 }
 
