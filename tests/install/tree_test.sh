@@ -9,7 +9,7 @@ faults=0
 fault() { printf '%s\n' "$*"; faults=$((faults + 1)); }
 
 cmake --install "$build" --prefix "$work/usr" >"$work/log" 2>&1 || { tail -n 5 "$work/log"; exit 1; }
-if grep -v "^-- \(Installing: $work\|Install configuration\)" "$work/log"; then
+if grep -v "^-- \(\(Installing\|Up-to-date\): $work\|Install configuration\)" "$work/log"; then
   fault "these lie outside of the prefix, or are no files"
 fi
 programs=(server hall relay organ sim journal impair web)

@@ -135,6 +135,13 @@ test('one finger holds and lifts, two turn the view', async () => {
   await touching.close();
 });
 
+test('a pose that is no number ends the session of who says it', async () => {
+  const { page } = await surgeon('Nan');
+  await page.evaluate(() => window.trocar.session.sample(0, { isDue: true, verb: 0, tip: [NaN, 0, 0], orientation: [0, 0, 0, 1] }));
+  await page.locator('.fault', { hasText: 'ToolSample' }).waitFor({ timeout: kPatience });
+  await page.close();
+});
+
 test('keys alone bring an instrument to the organ and press it', async () => {
   const { page, slot } = await surgeon('Kay');
   await page.keyboard.down('k');
