@@ -113,6 +113,8 @@ void prepare_help(CLI::App& app) {
   const auto examples = at == std::string::npos ? "" : footer.substr(at + kExamplesBegin.size());
   for (auto* command : app.get_subcommands([](CLI::App*) { return true; })) {
     command->formatter(app.get_formatter());
+    const std::string said = command->get_footer();  // the program's, unless it has its own
+    if (!said.empty() && said != footer) continue;
     const auto own = examples_of(examples, app.get_name() + " " + command->get_name());
     if (!own.empty()) command->footer(std::string(kExamplesBegin) + own);
   }

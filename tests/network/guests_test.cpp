@@ -113,9 +113,23 @@ TEST_F(Guests, the_connection_ends_with_the_last_of_them) {
 }
 
 TEST_F(Guests, who_is_refused_leaves_no_connection_behind) {
-  EXPECT_FALSE(join(1, "Sam", proto::ROLE_SURGEON));
+  EXPECT_FALSE(join(1, "", proto::ROLE_OBSERVER));
   EXPECT_TRUE(carrier_.reads_to_end());
   EXPECT_EQ(session_.on_io([&] { return session_.replicator().roster().list().size(); }), 0u);
+}
+
+TEST_F(Guests, hold_instruments) {
+  ASSERT_TRUE(join(1, "Sam", proto::ROLE_SURGEON));
+  Envelope sample;
+  sample.mutable_tool_sample()->set_sequence(1);
+  sample.mutable_tool_sample()->mutable_position_m()->set_x(0.1f);
+  sample.mutable_tool_sample()->mutable_orientation()->set_w(1);
+  ASSERT_TRUE(carrier_.send(wrap(1, sample)));
+  Envelope ping;
+  ping.mutable_ping()->set_client_time_us(7);
+  ASSERT_TRUE(carrier_.send(wrap(1, ping)));
+  EXPECT_EQ(receive(1)->pong().client_time_us(), 7u);
+  EXPECT_EQ(session_.on_io([&] { return session_.replicator().counters().samples; }), 1u);
 }
 
 TEST_F(Guests, nothing_is_kept_for_one_who_does_not_say_hello) {
