@@ -2,7 +2,7 @@
 // and the list of them all.
 
 import type { JSX } from 'preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 export interface KeyLine {
   keys: string;
@@ -55,7 +55,8 @@ window.addEventListener('keydown', event => {
 export function useEscape(isIn: boolean, leave: () => void): void {
   const latest = useRef(leave);
   latest.current = leave;
-  useEffect(() => {
+  // At once: a slow picture may keep other effects from running before the key comes.
+  useLayoutEffect(() => {
     if (!isIn) return undefined;
     const mine = (): void => latest.current();
     open.push(mine);
