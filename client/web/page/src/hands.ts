@@ -44,6 +44,7 @@ const keyOf = (shape: ToolShape): string =>
 
 interface Hand {
   instrument: number; // of the table; -1: none of it
+  shape: Instrument | ToolShape;
   asked: string[]; // keys of shapes that the list of people has not had yet
   listed: string;
   sample: HandSample | null; // where it is now
@@ -81,6 +82,7 @@ export class Hands {
   hasLetGo = false; // the page was hidden since the person last did something
   private readonly hands: Hand[] = kFirst.map(name => ({
     instrument: indexOf(name),
+    shape: instruments[indexOf(name)]!,
     asked: [],
     listed: '',
     sample: null,
@@ -117,7 +119,7 @@ export class Hands {
     private readonly picture: Picture,
     private readonly onChange: () => void,
   ) {
-    this.hands.forEach((hand, i) => this.hold(i, instruments[hand.instrument]!));
+    this.hands.forEach((hand, i) => this.hold(i, hand.shape));
     picture.holdsTools = true;
     picture.asHeld = tools => this.asHeld(tools);
     this.listen(picture.canvas);
@@ -176,6 +178,7 @@ export class Hands {
 
   private hold(hand: number, shape: Instrument | ToolShape): void {
     const { radiusM, lengthM, form } = shape;
+    this.hands[hand]!.shape = shape;
     this.replica.takeInHand(hand, {
       radiusM,
       lengthM,
@@ -239,8 +242,7 @@ export class Hands {
     this.fingers.clear();
     this.steps.clear();
     this.hands.forEach((hand, i) => {
-      const shape = instruments[hand.instrument];
-      if (shape) this.hold(i, shape);
+      this.hold(i, hand.shape);
       if (hand.sample) this.session.sample(i, { ...hand.sample, verb: Verb.None });
     });
     this.hasLetGo = true;

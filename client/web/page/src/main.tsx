@@ -14,7 +14,7 @@ import { ThemeButton } from './theme';
 const kRoleText: Record<Role, string> = {
   observer: 'an observer: you watch',
   surgeon: 'a surgeon: you hold instruments',
-  assistant: 'an assistant: you hold instruments, and give way to surgeons',
+  assistant: 'an assistant: you hold instruments, too',
   instructor: 'an instructor: you watch and lead the lesson',
 };
 
