@@ -48,7 +48,8 @@ TEST(JoinRequest, OfASurgeonBringsInstruments) {
 TEST(PageMessage, OfAToolIsForRolesThatMayHaveSome) {
   proto::Envelope said, read;
   said.mutable_tool_sample()->set_sequence(1);
-  const auto bytes = bytes_of(said.SerializeAsString());
+  const std::string text = said.SerializeAsString();
+  const auto bytes = bytes_of(text);
   for (const auto& role : wire::kRoles)
     EXPECT_EQ(read_page_message(bytes, role.role, read), role.rights.may_have_tools) << role.name;
 }
