@@ -9,9 +9,7 @@
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::testing {
-namespace {
-
-CutLiver make_cut_liver() {
+void operate_on_liver(const Visit& visit) {
   step::Simulation simulation(*catalogue::make_liver());
   const auto script = tool::parse_script(TROCAR_SOURCE_DIR "/deploy/scenes/eight-cuts.toml");
   EXPECT_TRUE(script.ok());
@@ -29,7 +27,6 @@ CutLiver make_cut_liver() {
     anchors.push_back(*tool::find_anchor(*script->tools[t].anchor, rest, surface));
     last = std::max(last, static_cast<Tick>(script->tools[t].keys.back().time_s * 1e3));
   }
-  CutLiver cut;
   for (Tick tick = 1; tick <= last; ++tick) {
     hands::TickInputs inputs;
     if (tick == 1) inputs.joins.push_back(join);
@@ -38,12 +35,19 @@ CutLiver make_cut_liver() {
           {tool_slot({0}, static_cast<int>(t)),
            tool::sample(script->tools[t], static_cast<double>(tick) * 1e-3, anchors[t])});
     simulation.tick(inputs, {});
-    if (const auto frame = simulation.pop_frame()) {
-      cut.positions.clear();
-      for (const auto& q : frame->surface) cut.positions.push_back(wire::to_metres(q));
-    }
+    if (const auto frame = simulation.pop_frame()) visit(simulation.layout(), *frame);
   }
-  cut.layout = simulation.layout();
+}
+
+namespace {
+
+CutLiver make_cut_liver() {
+  CutLiver cut;
+  operate_on_liver([&](const wire::SurfaceLayout& layout, const step::PublishedFrame& frame) {
+    cut.layout = layout;
+    cut.positions.clear();
+    for (const auto& q : frame.surface) cut.positions.push_back(wire::to_metres(q));
+  });
   cut.positions.resize(cut.layout.vertex_count());
   for (std::size_t i = 0; i < cut.positions.size(); ++i) {
     cut.rest.push_back(wire::to_metres(cut.layout.rest_quanta[i]));

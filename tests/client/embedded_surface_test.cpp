@@ -18,9 +18,9 @@
 #include <utility>
 
 #include "common/math/frame.h"
-#include "common/tool/script.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/client/cut_liver.h"
 
 namespace trocar::embedding {
 namespace {
@@ -78,41 +78,17 @@ Coarse liver_at_rest() {
 // deploy/scenes/eight-cuts.toml.
 template <typename Visit>
 void operate(const Visit& visit) {
-  step::Simulation simulation(*catalogue::make_liver());
-  const auto script = tool::parse_script(TROCAR_SOURCE_DIR "/deploy/scenes/eight-cuts.toml");
-  ASSERT_TRUE(script.ok());
-  const auto& mesh = simulation.organ().mesh;
-  std::vector<Vec3f> rest;
-  for (const auto& p : mesh.rest_positions) rest.push_back(to_float(p));
-  std::vector<tool::SurfaceTriangle> surface;
-  for (const auto& [a, b, c] : mesh.boundary_triangles)
-    surface.push_back({a.value, b.value, c.value});
-  hands::HandJoin join{.slot = {0}, .tool_count = static_cast<int>(script->tools.size())};
-  std::vector<tool::AnchorPoint> anchors;
-  Tick last = 0;
-  for (std::size_t t = 0; t < script->tools.size(); ++t) {
-    join.shapes[t] = script->tools[t].shape;
-    anchors.push_back(*tool::find_anchor(*script->tools[t].anchor, rest, surface));
-    last = std::max(last, static_cast<Tick>(script->tools[t].keys.back().time_s * 1e3));
-  }
-  visit(coarse_of(simulation.layout()));
-  std::uint32_t epoch = simulation.layout().epoch;
-  for (Tick tick = 1; tick <= last; ++tick) {
-    hands::TickInputs inputs;
-    if (tick == 1) inputs.joins.push_back(join);
-    for (std::size_t t = 0; t < script->tools.size() && tick % 8 == 1; ++t)
-      inputs.samples.push_back(
-          {tool_slot({0}, static_cast<int>(t)),
-           tool::sample(script->tools[t], static_cast<double>(tick) * 1e-3, anchors[t])});
-    simulation.tick(inputs, {});
-    const auto frame = simulation.pop_frame();
-    if (!frame || simulation.layout().epoch == epoch) continue;
-    epoch = simulation.layout().epoch;
-    Coarse coarse = coarse_of(simulation.layout());
-    for (std::size_t v = 0; v < coarse.rest.size() && v < frame->surface.size(); ++v)
-      coarse.positions[v] += wire::to_metres(frame->surface[v]);
-    visit(coarse);
-  }
+  visit(liver_at_rest());
+  std::uint32_t epoch = 0;
+  testing::operate_on_liver(
+      [&](const wire::SurfaceLayout& layout, const step::PublishedFrame& frame) {
+        if (layout.epoch == epoch) return;
+        epoch = layout.epoch;
+        Coarse coarse = coarse_of(layout);
+        for (std::size_t v = 0; v < coarse.rest.size() && v < frame.surface.size(); ++v)
+          coarse.positions[v] += wire::to_metres(frame.surface[v]);
+        visit(coarse);
+      });
 }
 
 double area_of(const Vec3f& a, const Vec3f& b, const Vec3f& c) {

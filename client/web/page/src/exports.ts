@@ -1,4 +1,4 @@
-// What the module exports (client/web/wasm/exports.cpp): numbers and places in its memory.
+// The module exports these (client/web/wasm/exports.cpp): numbers and places in its memory.
 
 export interface Exports {
   memory: WebAssembly.Memory;

@@ -78,7 +78,7 @@ export interface Lens {
   tanHalfHeight: number;
   isEndoscope: boolean;
 }
-// Where a hand has its tool, and what it asks of it; isDue: the session is to be told.
+// A hand has its tool there, and asks this of it; isDue: the session is to be told.
 export interface HandSample {
   isDue: boolean;
   verb: Verb;
@@ -95,7 +95,7 @@ export interface Rays {
   width: number;
   height: number;
 }
-// What mouse and keys do now.
+// Mouse and keys do this now.
 export interface HandInput {
   x: number; // pixels of the picture
   y: number;
@@ -450,7 +450,7 @@ export class Replica {
       [back = 0, nearest = 0] = this.floats(at, 2);
     return [back, nearest];
   }
-  // What the organ looks like, outside or where it is cut: colours of its parts in the troughs of
+  // Returns how the organ looks, outside or where it is cut: colours of its parts in the troughs of
   // its pattern, on its heights, of lines on it; and figures.
   look(isInside: boolean): Look {
     const f = this.floats(this.e.look(isInside), 32).slice();

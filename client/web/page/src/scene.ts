@@ -535,7 +535,7 @@ export class Picture {
   }
 }
 
-// What the organ's shader takes beside light and view, for one side of the organ.
+// The organ's shader takes these beside light and view, for one side of the organ.
 interface Side extends Record<string, IUniform> {
   part_dark: IUniform<Float32Array>;
   part_light: IUniform<Float32Array>;
