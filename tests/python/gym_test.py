@@ -5,12 +5,14 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+import tomllib
 import unittest
 
 import numpy as np
 import trocar
 from trocar import gym, picture
 from trocar.gym import scripted
+from trocar.gym.base import INSTRUMENTS
 
 
 def play(env, hand, seed):
@@ -34,6 +36,20 @@ def digest(env, seed, steps=6):
         state, reward, terminated, truncated, info = env.step(action)
         out += [gym.flatten(state).tobytes(), reward, terminated, truncated, info["state_hash"]]
     return out
+
+
+class InstrumentsTest(unittest.TestCase):
+    def test_they_are_those_of_the_programs(self):
+        table = pathlib.Path(__file__).parents[2] / "common/tool/instruments.toml"
+        known = {one["name"]: one for one in tomllib.loads(table.read_text())["instrument"]}
+        keys = {"radius": ("radius_mm", 1e-3), "reach": ("reach_mm", 1e-3), "edge": ("edge_mm", 1e-3),
+                "grip": ("grip_n", 1), "friction": ("friction", 1)}
+        for name in ("probe", "grasper", "scalpel"):
+            _, shape = INSTRUMENTS[name]
+            self.assertEqual(shape["form"], known[name]["form"])
+            for key, (said, unit) in keys.items():
+                if key in shape:
+                    self.assertAlmostEqual(shape[key], known[name].get(said, 0) * unit, msg=f"{name}.{key}")
 
 
 class SeedTest(unittest.TestCase):
