@@ -1,8 +1,8 @@
-#include "server/session/access/room.h"
+#include "common/intake/room.h"
 
 #include <gtest/gtest.h>
 
-namespace trocar::access {
+namespace trocar::intake {
 namespace {
 
 TEST(Places, observers_leave_a_tenth_to_who_leads) {
@@ -11,6 +11,13 @@ TEST(Places, observers_leave_a_tenth_to_who_leads) {
   EXPECT_EQ(places_for_observers(2), 1);
   EXPECT_EQ(places_for_observers(100), 90);
   EXPECT_EQ(places_for_observers(600), 540);
+}
+
+TEST(Room, counts_a_household_as_one_address) {
+  EXPECT_EQ(counted_as("2001:db8:1:2::7"), counted_as("2001:db8:1:2:ffff::8%eth0"));
+  EXPECT_NE(counted_as("2001:db8:1:2::7"), counted_as("2001:db8:1:3::7"));
+  EXPECT_EQ(counted_as("::ffff:10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(counted_as("10.0.0.1"), "10.0.0.1");
 }
 
 TEST(Room, is_full_of_one_address_before_it_is_full) {
@@ -28,4 +35,4 @@ TEST(Room, is_full_of_one_address_before_it_is_full) {
 }
 
 }  // namespace
-}  // namespace trocar::access
+}  // namespace trocar::intake

@@ -6,7 +6,11 @@
 #include <map>
 #include <string>
 
-namespace trocar::access {
+namespace trocar::intake {
+
+// "2001:db8:1:2::/64" for "2001:db8:1:2::7", which is what one household has; other addresses as
+// they are; an IPv4 address that is written as IPv6 counts as IPv4.
+std::string counted_as(const std::string& address);
 
 // Returns how many of so many places observers may have.
 int places_for_observers(int places);
@@ -28,4 +32,4 @@ class Room {
   std::map<std::string, int> by_address_;
 };
 
-}  // namespace trocar::access
+}  // namespace trocar::intake

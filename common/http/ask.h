@@ -11,11 +11,12 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/http/stream.h"
 #include "common/secure/tls.h"
 
-namespace trocar::monitoring {
+namespace trocar::http {
 
-struct HttpQuestion {
+struct Question {
   std::string host;
   std::uint16_t port = 0;
   std::string method, path;          // GET, POST or DELETE
@@ -26,19 +27,14 @@ struct HttpQuestion {
   Bytes certificate_der;             // what it has to show; empty: what `tls` trusts, of this host
 };
 
-struct HttpAnswer {
-  unsigned status = 0;
-  std::string body;
-};
-
 inline constexpr std::size_t kMostAnswerBytes = 1u << 20;
 
 // Runs on the coroutine's executor. ErrorCode::ResourceMissing with the reason if nothing answers
 // in time, or what answers speaks no HTTP, or says more than kMostAnswerBytes; ErrorCode::Refused
 // if its certificate is a wrong one, and then nothing was asked. The deadline does
 // not hold for the name: its servers have their own. An address needs none.
-asio::awaitable<Result<HttpAnswer>> ask(HttpQuestion question);
+asio::awaitable<Result<Answer>> ask(Question question);
 // The same for who has no I/O thread: returns when there is the answer, or the error.
-Result<HttpAnswer> ask_and_wait(HttpQuestion question);
+Result<Answer> ask_and_wait(Question question);
 
-}  // namespace trocar::monitoring
+}  // namespace trocar::http
