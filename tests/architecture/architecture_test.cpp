@@ -17,7 +17,6 @@ constexpr LargeClass kLargeClasses[] = {
     {"client/app", "ClientOptions", 53, "has a field for each option, and no rule between them"},
     {"client/embedding", "EmbeddedSurface", 68, "arrays per fine vertex that one pass writes"},
     {"client/haptics", "TouchModel", 59, "one state that each answer corrects"},
-    {"client/net", "NetSource::Session", 118, "a connection, its return and its figures"},
     {"client/replay", "ReplaySource", 63, "two interfaces, that of a source and that of a player"},
     {"client/replica", "Replica", 115, "each message has a method, and most of them a member"},
     {"client/web/wasm", "PageModel", 65, "each call of the page has a method"},
