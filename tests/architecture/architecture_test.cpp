@@ -18,7 +18,7 @@ constexpr LargeClass kLargeClasses[] = {
     {"client/embedding", "EmbeddedSurface", 68, "arrays per fine vertex that one pass writes"},
     {"client/haptics", "TouchModel", 59, "one state that each answer corrects"},
     {"client/replay", "ReplaySource", 63, "two interfaces, that of a source and that of a player"},
-    {"client/replica", "Replica", 115, "each message has a method, and most of them a member"},
+    {"client/replica", "Replica", 65, "frames, what they start from and what heals them"},
     {"client/web/wasm", "PageModel", 65, "each call of the page has a method"},
     {"server/app/server", "Server", 62, "what a process has one of"},
     {"server/watch/bus", "Publisher", 56, "a connection to the bus, and what goes out on it"},
