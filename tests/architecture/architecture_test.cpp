@@ -21,7 +21,6 @@ constexpr LargeClass kLargeClasses[] = {
     {"client/replica", "Replica", 65, "frames, what they start from and what heals them"},
     {"client/web/wasm", "PageModel", 65, "each call of the page has a method"},
     {"server/app/server", "Server", 62, "what a process has one of"},
-    {"server/watch/bus", "Publisher", 56, "a connection to the bus, and what goes out on it"},
     {"server/session/recording", "Recorder", 57, "the file, its writer and what it keeps"},
     {"server/session/recording", "Verifier", 54, "a simulation beside the recording's"},
     {"server/session/replication", "Replicator", 68,
