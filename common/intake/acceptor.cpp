@@ -50,10 +50,12 @@ struct Acceptor::State : std::enable_shared_from_this<Acceptor::State> {
         all(given.most, given.most_per_address),
         silent(given.most_silent, given.most_silent_per_address) {}
 
+  // One who has only just come cannot be cut yet.
   void cut(Peer& peer, Cut why) {
-    peer.speak();  // nobody is cut twice
     const auto end = peer.cut_;
-    if (end) end(why);
+    if (!end) return;
+    peer.speak();  // nobody is cut twice
+    end(why);
   }
 
   // False: nobody can be cut.
@@ -64,7 +66,9 @@ struct Acceptor::State : std::enable_shared_from_this<Acceptor::State> {
     for (const auto& [of, count] : counts) most = std::max(most, count);
     const auto oldest = std::ranges::find_if(silent_peers, [&](const auto& one) {
       const auto of = counted_as(one.second->address_);
-      return lack == Room::Place::AddressFull ? of == counted_as(address) : counts[of] == most;
+      const bool is_of_those =
+          lack == Room::Place::AddressFull ? of == counted_as(address) : counts[of] == most;
+      return one.second->cut_ && is_of_those;
     });
     if (oldest == silent_peers.end()) return false;
     ++counters.cut;
