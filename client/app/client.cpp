@@ -130,7 +130,7 @@ Status Run::step(std::uint64_t now_ns) {
 
 // A person without a picture, or who looks elsewhere, hears it too.
 void Run::note_recording() {
-  const auto& recording = replica_.recording();
+  const auto& recording = replica_.told().recording();
   if (recording.is_damaged() && recording.status != recording_told_)
     log::warn("{}", recording.text);
   recording_told_ = recording.status;

@@ -119,7 +119,7 @@ void Hands::take(std::size_t instrument, replica::SessionSource& source) {
 
 // Instruments that it has asked for itself appear in the list later, in the same order.
 void Hands::take_what_is_listed(const replica::Replica& replica) {
-  const auto* own = replica.find_participant(replica.own_slot());
+  const auto* own = replica.told().find_participant(replica.own_slot());
   for (std::size_t i = 0; own != nullptr && i < std::min(mouse_.size(), own->tools.size()); ++i) {
     auto& hand = mouse_[i];
     const auto& shape = own->tools[i];

@@ -65,7 +65,7 @@ std::vector<ui::HudParticipant> participants_of(const replica::Replica& replica,
                                                 bool is_replay) {
   std::vector<ui::HudParticipant> participants;
   const auto waiting = figures_of(replica).pace.rate.waiting_tools;
-  for (const auto& participant : replica.participants()) {
+  for (const auto& participant : replica.told().participants()) {
     ui::HudParticipant shown;
     shown.name = participant.name;
     if (participant.relayed > 0)
@@ -101,14 +101,14 @@ std::vector<ui::HudParticipant> participants_of(const replica::Replica& replica,
 
 void add_person(const replica::Replica& replica, const Onlooker& onlooker, bool follows_view,
                 ui::HudModel& model) {
-  const auto* own = replica.find_participant(replica.own_slot());
+  const auto* own = replica.told().find_participant(replica.own_slot());
   model.own_role =
       onlooker.is_replay ? "replay" : replica::name_of(own != nullptr ? own->role : onlooker.role);
   if (!onlooker.is_replay && own != nullptr) model.own_role += ", " + own->name;
   if (own != nullptr && !own->frozen_by.empty())
     model.frozen_text = own->frozen_by + " keeps your tools where they are.";
   model.has_loan = own != nullptr && own->lent_tools != 0;
-  const auto& people = replica.participants();
+  const auto& people = replica.told().participants();
   const auto leader = std::ranges::find_if(people, &replica::Participant::leads_view);
   if (leader != people.end() && leader->slot == replica.own_slot())
     model.view_text = "Others may follow your view.";
@@ -153,10 +153,10 @@ void add_figures(const replica::Replica& replica, const replica::SessionSource& 
 
 void add_recording(const replica::Replica& replica, bool is_replay, ui::HudModel& model) {
   using Status = wire::RecordingStatus;
-  const auto recorded = replica.recording().status;
+  const auto recorded = replica.told().recording().status;
   if (!is_replay && recorded != Status::Unknown)
     model.is_recorded = recorded == Status::Whole || recorded == Status::Gapped;
-  model.recording_text = replica.recording().text;
+  model.recording_text = replica.told().recording().text;
   model.has_recording_ended = recorded == Status::Failed;
 }
 
@@ -191,7 +191,7 @@ void add_lent_view(const replica::Replica& replica, const Pane& pane, bool is_re
 }
 
 void add_messages(const replica::Replica& replica, std::uint64_t now_ns, ui::HudModel& model) {
-  for (const auto& notice : replica.notices()) {
+  for (const auto& notice : replica.told().notices()) {
     const double age =
         now_ns > notice.arrival_ns ? static_cast<double>(now_ns - notice.arrival_ns) * 1e-9 : 0.0;
     const bool is_own = notice.tool.owner() == replica.own_slot();
@@ -230,11 +230,11 @@ namespace {
 // Looks for what became of one's own last answer in this stage. With a wrong one comes the hint,
 // which the server tells later, of a lesson that the programs bring.
 void add_verdict(const replica::Replica& replica, ui::HudLesson& shown) {
-  const auto& lesson = *replica.lesson();
-  const auto* own = replica.find_participant(replica.own_slot());
+  const auto& lesson = *replica.told().lesson();
+  const auto* own = replica.told().find_participant(replica.own_slot());
   if (own == nullptr || lesson.goal != replica::LessonView::Goal::Find) return;
   const std::string head = own->name + " says that it is here: ";
-  for (const auto& notice : replica.notices()) {
+  for (const auto& notice : replica.told().notices()) {
     if (notice.tick < lesson.begin_tick || !notice.is_for_all || !notice.text.starts_with(head))
       continue;
     shown.is_right = !notice.is_refused;
@@ -268,7 +268,7 @@ void add_outcome(const replica::LessonView& lesson, std::optional<float> best_be
 
 void add_lesson(const replica::Replica& replica, const render::ImageTexture& image,
                 const Onlooker& onlooker, std::optional<float> best_before, ui::HudModel& model) {
-  const auto& lesson = replica.lesson();
+  const auto& lesson = replica.told().lesson();
   if (!lesson) return;
   ui::HudLesson shown{.title = lesson->title,
                       .stage = std::to_string(lesson->stage + 1) + " of " +
@@ -313,20 +313,20 @@ void add_lesson(const replica::Replica& replica, const render::ImageTexture& ima
 
 void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) {
   if (is_replay) return;
-  const auto& pace = replica.pace();
+  const auto& pace = replica.told().pace();
   model.is_paused = pace.is_paused;
   if (pace.is_paused) {
     model.pace_text = (pace.by.empty() ? "Somebody" : pace.by) + " has paused the session.";
   } else if (pace.rate < 1) {
     model.pace_text = ui::slow_text(pace.rate);
   }
-  if (!model.can_mark || !replica.has_pace()) return;
+  if (!model.can_mark || !replica.told().has_pace()) return;
   ui::HudConduct conduct{.is_paused = pace.is_paused,
                          .rate = pace.rate,
-                         .marks = replica.marks(),
+                         .marks = replica.told().marks(),
                          .hands = {},
                          .own = replica.own_slot()};
-  for (const auto& who : replica.participants())
+  for (const auto& who : replica.told().participants())
     if (!who.tools.empty())
       conduct.hands.push_back(
           {who.slot, who.name, !who.frozen_by.empty(), instruments_of(who.tools)});

@@ -21,7 +21,7 @@ constexpr std::size_t kWoundTriangles = 64;  // the newest ones are the wound th
 }  // namespace
 
 const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
-  return replica.find_participant(slot.owner());
+  return replica.told().find_participant(slot.owner());
 }
 
 tool::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot) {
@@ -115,7 +115,7 @@ render::SceneTool Pane::scene_tool(const replica::Replica& replica, const replic
   // from it as tissue last kept it.
   const device::MouseTool* mouse = hands.mouse_tool(tool.slot.number());
   // A tool that is held still, or lent, is not where its hand is.
-  const auto* own = replica.find_participant(replica.own_slot());
+  const auto* own = replica.told().find_participant(replica.own_slot());
   const bool follows_hand = own == nullptr || (own->frozen_by.empty() &&
                                                (own->lent_tools >> tool.slot.number() & 1u) == 0);
   if (follows_hand && mouse != nullptr && mouse->is_valid() &&
@@ -143,8 +143,8 @@ std::vector<render::Hold> Pane::holds(const replica::Replica& replica, bool show
 }
 
 std::optional<Vec3f> Pane::lesson_target(const replica::Replica& replica) {
-  if (!replica.lesson() || replica.newest() == nullptr) return std::nullopt;
-  return replica.lesson()->target_m(replica.newest()->tick);
+  if (!replica.told().lesson() || replica.newest() == nullptr) return std::nullopt;
+  return replica.told().lesson()->target_m(replica.newest()->tick);
 }
 
 void Pane::add_lines(const replica::Replica& replica) {
@@ -179,7 +179,7 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
     for (const replica::Tool& tool : surface_.tools())
       scene_.tools.push_back(scene_tool(replica, tool, hands));
     add_lines(replica);
-    for (const replica::Pointer& pointer : replica.pointers(now_ns_))
+    for (const replica::Pointer& pointer : replica.told().pointers(now_ns_))
       scene_.pointers.push_back(
           {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});
     if (const auto target = lesson_target(replica))
@@ -251,8 +251,8 @@ std::vector<ui::HudLabel> Pane::labels(const replica::Replica& replica, bool sho
     labels.push_back(
         {at->x + left, at->y, owner->name + force, shape::colour_of_slot(tool.slot.owner().value)});
   }
-  for (const replica::Pointer& pointer : replica.pointers(now_ns_)) {
-    const auto* owner = replica.find_participant(pointer.participant);
+  for (const replica::Pointer& pointer : replica.told().pointers(now_ns_)) {
+    const auto* owner = replica.told().find_participant(pointer.participant);
     const auto at = camera_.project(pointer.position_m, size());
     if (owner == nullptr || !at) continue;
     labels.push_back({at->x + left, at->y, owner->name + " points here",

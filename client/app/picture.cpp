@@ -174,7 +174,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
 
 void Picture::share_view(const replica::Replica& replica, replica::SessionSource& source,
                          const device::PointerInput& input) {
-  const auto* own = replica.find_participant(replica.own_slot());
+  const auto* own = replica.told().find_participant(replica.own_slot());
   if (own != nullptr && own->leads_view) {
     shared_view_.follows = false;
     if (input.right || input.middle) pane_.lent().leave();
@@ -191,7 +191,7 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
     shared_view_.follows = false;
     leave_lent_views();
   }
-  const auto& led = replica.led_view();
+  const auto& led = replica.told().led_view();
   if (!shared_view_.follows || !led) return;
   pane_.cease_to_aim();
   pane_.camera().look(led->eye_m, led->target_m);
@@ -214,8 +214,9 @@ void Picture::move_mouse_tool(const replica::Replica& replica, Hands& hands,
 
 void LessonPart::load(const replica::Replica& replica) {
   static const std::string kNone;
-  const auto& wanted =
-      replica.lesson() && !replica.lesson()->is_over ? replica.lesson()->picture : kNone;
+  const auto& wanted = replica.told().lesson() && !replica.told().lesson()->is_over
+                           ? replica.told().lesson()->picture
+                           : kNone;
   if (wanted == file) return;
   file = wanted;
   texture.clear();

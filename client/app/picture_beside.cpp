@@ -11,7 +11,7 @@ namespace trocar::app {
 namespace {
 
 std::string stage_text(const replica::Replica& replica) {
-  const auto& lesson = replica.lesson();
+  const auto& lesson = replica.told().lesson();
   if (!lesson) return {};
   if (!lesson->is_over)
     return "stage " + std::to_string(lesson->stage + 1) + " of " + std::to_string(lesson->stages) +

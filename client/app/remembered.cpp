@@ -73,7 +73,7 @@ void remember(const Person& person) {
 }
 
 void BestPoints::note(const replica::Replica& replica) {
-  const auto& lesson = replica.lesson();
+  const auto& lesson = replica.told().lesson();
   if (!lesson || !lesson->is_over || !replica.own_slot().has_tools()) return;
   if (noted_ == lesson->begin_tick) return;
   noted_ = lesson->begin_tick;

@@ -63,12 +63,12 @@ Attachment attach(const Vec3f& place, const Topology& topology, std::span<const 
 
 void DrawnLines::attach_points(const Replica& replica) {
   const auto& topology = replica.topology();
-  const auto& strokes = replica.strokes();
-  if (drawing_version_ != replica.drawing_version() ||
+  const auto& strokes = replica.told().strokes();
+  if (drawing_version_ != replica.told().drawing_version() ||
       history_version_ != replica.history_version())
     attached_.clear();
   const bool is_cut = topology_version_ != replica.topology_version();
-  drawing_version_ = replica.drawing_version();
+  drawing_version_ = replica.told().drawing_version();
   history_version_ = replica.history_version();
   topology_version_ = replica.topology_version();
   for (std::size_t i = 0; is_cut && i < attached_.size(); ++i)
@@ -91,7 +91,7 @@ void DrawnLines::update(const Replica& replica, std::span<const Vec3f> positions
   attach_points(replica);
   for (std::size_t i = 0; i < attached_.size(); ++i) {
     auto& line = lines_.emplace_back();
-    line.participant = replica.strokes()[i].participant;
+    line.participant = replica.told().strokes()[i].participant;
     for (const auto& point : attached_[i]) {
       auto& shown = line.points.emplace_back();
       if (point.triangle == kNoTriangle || point.distance_m > kLostMetres) continue;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "client/replica/message_parts.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
 #include "common/wire/figure_messages.h"
@@ -13,31 +14,8 @@
 namespace trocar::replica {
 namespace {
 
-// 1 mm in quanta, squared.
-constexpr std::int64_t kMovedQuantaSquared = 976;  // (1 mm / 32 um)^2 = 976.6
 // A jump in time this large is a seek, not a late frame.
 constexpr Tick kSeekTicks = 1000;
-
-std::array<std::uint32_t, 3> indices_of(const wire::Corners& corners) {
-  return {corners[0].value, corners[1].value, corners[2].value};
-}
-
-Vec3f to_vec3(const proto::Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
-tool::Verb to_verb(proto::Verb verb) {
-  switch (verb) {
-    case proto::VERB_PUSH:
-      return tool::Verb::Push;
-    case proto::VERB_GRASP:
-      return tool::Verb::Grasp;
-    case proto::VERB_CUT:
-      return tool::Verb::Cut;
-    default:
-      return tool::Verb::None;
-  }
-}
 
 Pose to_pose(const proto::Vec3& position, const proto::Quat& orientation) {
   const Quatf q{orientation.x(), orientation.y(), orientation.z(), orientation.w()};
@@ -74,6 +52,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
                          std::size_t bytes) {
   counters_.bytes += bytes;
   if (!fault_.ok()) return;
+  if (const auto taken = told_.take(message, arrival_ns); !taken)
+    return fail(taken.error().message);
   switch (message.message_case()) {
     case proto::Envelope::kWelcome:
       return apply_welcome(message.welcome());
@@ -91,39 +71,12 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_state(message.frame_state());
     case proto::Envelope::kFrameStatePart:
       return apply_state_part(message.frame_state_part());
-    case proto::Envelope::kParticipants:
-      return apply_participants(message.participants());
-    case proto::Envelope::kClaimEvent:
-      return apply_claim(message.claim_event(), arrival_ns);
-    case proto::Envelope::kMarkEvent:
-      return apply_mark(message.mark_event(), arrival_ns);
-    case proto::Envelope::kRecordingState:
-      return apply_recording(message.recording_state());
-    case proto::Envelope::kPointEvent:
-      return apply_point(message.point_event(), arrival_ns);
-    case proto::Envelope::kTeachEvent:
-      return apply_teach(message.teach_event(), arrival_ns);
-    case proto::Envelope::kDrawing:
-      return apply_drawing(message.drawing());
-    case proto::Envelope::kViewEvent:
-      return apply_view(message.view_event(), arrival_ns);
-    case proto::Envelope::kSessionPace:
-      return apply_pace(message.session_pace());
-    case proto::Envelope::kMarkList:
-      return apply_marks(message.mark_list());
-    case proto::Envelope::kLessonStage:
-      return apply_lesson(message.lesson_stage());
-    case proto::Envelope::kLessonProgress:
-      return apply_progress(message.lesson_progress());
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;
       return answer_barrier();
-    case proto::Envelope::kGoodbye:
-      goodbye_text_ = message.goodbye().text();
-      return;
     default:
-      return;  // a newer minor version's message, or the source's own business
+      return;  // told_ has it; or a newer minor version's message, or the source's own business
   }
 }
 
@@ -134,7 +87,6 @@ void Replica::apply_welcome(const proto::Welcome& message) {
   if (message.ticks_per_frame() != kTicksPerFrame || message.tick_us() != 1000)
     return fail("Welcome: tick_us and ticks_per_frame must be 1000 and 16");
   has_datagrams_ = message.has_datagrams();
-  server_minor_ = message.protocol_minor();
   if (message.participant() < kMaxParticipants)
     own_slot_.value = static_cast<std::uint8_t>(message.participant());
   if (++welcome_count_ > 1) begin_anew();
@@ -143,39 +95,28 @@ void Replica::apply_welcome(const proto::Welcome& message) {
 // Forgets what was asked for, and what came before the next topology.
 void Replica::begin_anew() {
   request_pending_ = false;
-  to_show_.clear();
+  surface_.forget_waiting();
   if (sync_state_ != SyncState::WaitingForTopology) sync_state_ = SyncState::WaitingForKeyframe;
-  strokes_.clear();
-  lesson_strokes_ = 0;
-  lesson_.reset();
-  pace_ = {};
-  marks_.clear();
-  ++drawing_version_;
-  led_view_.reset();
   barrier_.reset();
 }
 
 void Replica::apply_topology(const proto::SurfaceTopology& message) {
   auto layout = wire::read(message);
   if (!layout.ok()) return fail(layout.error().message);
-  layout_ = std::move(*layout);
-  organ_name_ = message.organ_name();
-  is_layout_new_ = true;
-  to_show_.clear();
+  surface_.begin(std::move(*layout), message.organ_name());
   assembler_.clear();
   early_state_.reset();
   request_pending_ = false;
-  if (sync_state_ == SyncState::WaitingForTopology) show_layout();
+  if (sync_state_ == SyncState::WaitingForTopology) show_anew();
   if (sync_state_ != SyncState::Healing) sync_state_ = SyncState::WaitingForKeyframe;
 }
 
 void Replica::apply_change(const proto::SurfaceChange& message, std::size_t bytes) {
   if (sync_state_ == SyncState::WaitingForTopology) return;
   // Changes come by stream and as datagrams: each counts once, and what is missing is on its way.
-  const bool is_known = message.epoch() <= layout_.epoch;
-  if (has_datagrams_ && (is_known || message.from_epoch() > layout_.epoch)) return;
-  auto change = wire::read(message, layout_);
-  const Status applied = change.ok() ? wire::apply(*change, layout_) : Status(change.error());
+  const bool is_known = message.epoch() <= surface_.layout().epoch;
+  if (has_datagrams_ && (is_known || message.from_epoch() > surface_.layout().epoch)) return;
+  const Status applied = surface_.apply(message);
   if (!applied.ok()) {
     if (sync_state_ == SyncState::Healing) return;  // the topology is on its way
     ++counters_.change_mismatches;
@@ -184,8 +125,6 @@ void Replica::apply_change(const proto::SurfaceChange& message, std::size_t byte
   }
   ++counters_.surface_changes;
   counters_.change_bytes += bytes;
-  newest_change_us_ = message.server_time_us();
-  if (!is_layout_new_) to_show_.push_back(std::move(*change));
 }
 
 void Replica::apply_fine_surface(const proto::FineSurfacePart& message) {
@@ -197,56 +136,16 @@ void Replica::apply_fine_surface(const proto::FineSurfacePart& message) {
   if (fine_surface_ == nullptr || *fine_surface_ != *surface) fine_surface_ = std::move(surface);
 }
 
-void Replica::show_layout() {
-  topology_.epoch = layout_.epoch;
-  topology_.organ_name = organ_name_;
-  topology_.rest_positions.clear();
-  for (const auto& rest : layout_.rest_quanta)
-    topology_.rest_positions.push_back(wire::to_metres(rest));
-  topology_.triangles.clear();
-  for (std::size_t i = 0; i < layout_.triangles.size(); ++i)
-    topology_.triangles.push_back(layout_.has_triangle(TriangleIndex(i))
-                                      ? indices_of(layout_.triangles[i])
-                                      : std::array<std::uint32_t, 3>{});
-  topology_.is_wound = layout_.is_wound;
-  topology_.fixed_vertices.clear();
-  for (const VertexIndex v : layout_.fixed_vertices) topology_.fixed_vertices.push_back(v.value);
-  ++topology_version_;
+void Replica::show_anew() {
+  surface_.show();
   history_.clear();
   ++history_version_;
-  has_moved_.resize(std::max(has_moved_.size(), layout_.vertex_count()), 0);
-  is_layout_new_ = false;
-}
-
-void Replica::show_changes() {
-  for (const wire::SurfaceChange& change : to_show_) {
-    for (const wire::NewVertex& vertex : change.new_vertices) {
-      if (vertex.is_fixed)
-        topology_.fixed_vertices.push_back(
-            static_cast<std::uint32_t>(topology_.rest_positions.size()));
-      topology_.rest_positions.push_back(wire::to_metres(vertex.rest_quanta));
-    }
-    for (const TriangleIndex number : change.removed) {
-      topology_.triangles[number.value] = {};
-      topology_.is_wound[number.value] = 0;
-    }
-    for (const wire::NewTriangle& triangle : change.added) {
-      topology_.triangles.push_back(triangle.is_gap() ? decltype(indices_of(triangle.corners)){}
-                                                      : indices_of(triangle.corners));
-      topology_.is_wound.push_back(triangle.is_wound);
-    }
-    topology_.epoch = change.epoch;
-  }
-  shown_change_us_ = newest_change_us_;
-  ++topology_version_;
-  has_moved_.resize(std::max(has_moved_.size(), layout_.vertex_count()), 0);
-  to_show_.clear();
 }
 
 void Replica::extend_history(const wire::QuantisedSurface& surface) {
   for (SessionFrame& frame : history_) {
     auto& known = frame.surface;
-    for (const wire::SurfaceChange& change : to_show_)
+    for (const wire::SurfaceChange& change : surface_.waiting())
       for (const wire::NewVertex& vertex : change.new_vertices)
         known.push_back(vertex.has_parents()
                             ? wire::between(known[vertex.a.value], known[vertex.b.value], vertex.t)
@@ -266,7 +165,7 @@ bool Replica::decode_blood(const proto::SurfaceFrame& message, const wire::Blood
   scratch_blood_.clear();
   if (!message.has_blood()) return true;
   scratch_blood_ = base;
-  scratch_blood_.resize(layout_.vertex_count(), 0);  // dry, as on the server
+  scratch_blood_.resize(surface_.layout().vertex_count(), 0);  // dry, as on the server
   const auto payload = bytes_of(std::string_view(message.blood()));
   return wire::decode_blood(payload, scratch_blood_).ok() &&
          wire::blood_crc(scratch_blood_) == message.blood_crc();
@@ -277,13 +176,13 @@ bool Replica::decode_surface(const proto::SurfaceFrame& message) {
   if (!message.is_keyframe() && ++deltas_seen_ == corrupt_at_ && !payload.empty())
     payload[payload.size() / 2] ^= 0x10u;
   if (message.is_keyframe()) {
-    scratch_.assign(layout_.vertex_count(), {});
+    scratch_.assign(surface_.layout().vertex_count(), {});
     if (!wire::decode_keyframe(payload, scratch_).ok() || !decode_blood(message, {})) return false;
   } else {
     const Base base = find_base(message.base_frame());
     if (!decode_blood(message, *base.blood)) return false;
     scratch_ = *base.surface;
-    scratch_.resize(layout_.vertex_count());  // zeros, as on the server
+    scratch_.resize(surface_.layout().vertex_count());  // zeros, as on the server
     if (!wire::decode_delta(payload, scratch_).ok()) return false;
   }
   return wire::surface_crc(scratch_) == message.surface_crc();
@@ -292,7 +191,7 @@ bool Replica::decode_surface(const proto::SurfaceFrame& message) {
 // Datagrams have brought a newer frame, or a change of the surface that comes after it.
 bool Replica::is_overtaken(const proto::SurfaceFrame& message) const {
   if (!has_datagrams_) return false;
-  if (message.epoch() < layout_.epoch) return true;
+  if (message.epoch() < surface_.layout().epoch) return true;
   return sync_state_ == SyncState::InStep && message.frame() <= history_.back().frame;
 }
 
@@ -308,7 +207,7 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
     return;
   }
   // A keyframe of an unknown epoch is as good as none: its topology has to come first.
-  if (message.epoch() != layout_.epoch ||
+  if (message.epoch() != surface_.layout().epoch ||
       (!message.is_keyframe() && find_base(message.base_frame()).surface == nullptr)) {
     ++counters_.base_mismatches;
     return need_keyframe(message.frame());
@@ -331,9 +230,9 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
 
 // A slice of another epoch is dropped: its change is still under way by the stream, or it is late.
 void Replica::apply_slice(const proto::SurfaceSlice& message, std::uint64_t arrival_ns) {
-  if (sync_state_ != SyncState::InStep || message.epoch() != layout_.epoch) return;
+  if (sync_state_ != SyncState::InStep || message.epoch() != surface_.layout().epoch) return;
   if (message.frame() <= history_.back().frame) return;
-  auto whole = assembler_.add(message, layout_.vertex_count());
+  auto whole = assembler_.add(message, surface_.layout().vertex_count());
   if (!whole) return;
   scratch_ = std::move(whole->surface);
   scratch_blood_ = std::move(whole->blood);
@@ -358,16 +257,6 @@ void Replica::apply_state_part(const proto::FrameStatePart& message) {
     early_state_ = std::make_unique<proto::FrameState>(*state);
 }
 
-void Replica::count_moved() {
-  for (std::size_t i = 0; i < scratch_.size(); ++i) {
-    const std::int64_t x = scratch_[i].x, y = scratch_[i].y, z = scratch_[i].z;
-    if (has_moved_[i] == 0 && x * x + y * y + z * z > kMovedQuantaSquared) {
-      has_moved_[i] = 1;
-      ++moved_count_;
-    }
-  }
-}
-
 void Replica::accept_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
   if (has_datagrams_) assembler_.keep(header.frame, scratch_, scratch_blood_);
   show_frame(header, arrival_ns);
@@ -384,11 +273,11 @@ void Replica::accept_frame(const FrameHeader& header, std::uint64_t arrival_ns) 
 }
 
 void Replica::show_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
-  if (is_layout_new_) {
-    show_layout();
-  } else if (!to_show_.empty()) {
+  if (surface_.is_new()) {
+    show_anew();
+  } else if (!surface_.waiting().empty()) {
     extend_history(scratch_);
-    show_changes();
+    surface_.show();
   }
   ++counters_.frames;
   if (header.is_keyframe) {
@@ -407,7 +296,7 @@ void Replica::show_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
     for (std::size_t i = 0; i < scratch_.size(); ++i)
       counters_.changed_vertices += !(scratch_[i] == before[i]);
   }
-  count_moved();
+  moved_.count(scratch_);
   SessionFrame next;
   if (history_.size() >= kHistoryFrames) {
     next = std::move(history_.front());  // its buffers are used again
@@ -475,7 +364,7 @@ void Replica::apply_state(const proto::FrameState& message) {
     frame.tools.push_back(tool);
   }
   std::ranges::sort(frame.tools, {}, &Tool::slot);
-  frame.regions.resize(topology_.rest_positions.size());
+  frame.regions.resize(surface_.topology().rest_positions.size());
   if (!expand_regions(message, frame.regions))
     return fail("FrameState.region_runs: runs exceed the surface");
   auto figures = wire::read(message);
@@ -484,68 +373,9 @@ void Replica::apply_state(const proto::FrameState& message) {
   frame.has_state = true;
 }
 
-void Replica::apply_participants(const proto::Participants& message) {
-  participants_.clear();
-  for (const auto& entry : message.participant()) {
-    if (entry.slot() >= kMaxParticipants) return fail("Participants: slot out of range");
-    Participant participant;
-    participant.slot.value = static_cast<std::uint8_t>(entry.slot());
-    participant.name = entry.name();
-    participant.role = wire::role_of(entry.role());
-    for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
-    participant.is_away = entry.is_away();
-    participant.frozen_by = entry.frozen_by();
-    participant.lent_tools = entry.lent_tools();
-    participant.leads_view = entry.leads_view();
-    participant.relayed = entry.relayed_watchers();
-    participants_.push_back(std::move(participant));
-  }
-  std::ranges::sort(participants_, {}, &Participant::slot);
-  if (std::ranges::none_of(participants_, &Participant::leads_view)) led_view_.reset();
-}
-
-void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns) {
-  if (message.tool() >= kMaxTools) return fail("ClaimEvent.tool: slot out of range");
-  Notice notice;
-  notice.tick = message.tick();
-  notice.tool.value = static_cast<std::uint8_t>(message.tool());
-  notice.verb = to_verb(message.verb());
-  if (message.outcome() >= 0 && message.outcome() < wire::kClaimOutcomes)
-    notice.outcome = static_cast<ClaimOutcome>(message.outcome());
-  notice.holder = message.holder_name();
-  notice.text = message.text();
-  notice.arrival_ns = arrival_ns;
-  add_notice(std::move(notice));
-}
-
-void Replica::add_notice(Notice notice) {
-  notices_.push_back(std::move(notice));
-  if (notices_.size() > kMaxNotices) notices_.pop_front();
-  ++notice_count_;
-}
-
-void Replica::apply_recording(const proto::RecordingState& message) {
-  const bool is_known = message.status() >= 0 && message.status() <= proto::RECORDING_FAILED;
-  recording_.status = is_known ? static_cast<wire::RecordingStatus>(message.status())
-                               : wire::RecordingStatus::Unknown;
-  recording_.frames_missing = message.frames_missing();
-  recording_.text = message.text().substr(0, kMaxRecordingText);
-}
-
-const Participant* Replica::find_participant(ParticipantSlot slot) const {
-  const auto found = std::ranges::find(participants_, slot, &Participant::slot);
-  return found == participants_.end() ? nullptr : &*found;
-}
-
 std::optional<double> Replica::age_ms(double server_now_us) const {
   if (history_.empty() || history_.back().server_time_us == 0) return std::nullopt;
   return (server_now_us - static_cast<double>(history_.back().server_time_us)) * 1e-3;
-}
-
-double Replica::share_moved() const {
-  return has_moved_.empty()
-             ? 0.0
-             : static_cast<double>(moved_count_) / static_cast<double>(has_moved_.size());
 }
 
 }  // namespace trocar::replica

@@ -31,43 +31,29 @@
 #include <optional>
 
 #include "client/replica/frame_assembler.h"
+#include "client/replica/moved_share.h"
 #include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
+#include "client/replica/shown_surface.h"
+#include "client/replica/told.h"
 #include "common/base/result.h"
 #include "common/wire/fine_surface.h"
-#include "common/wire/recording_state.h"
-#include "common/wire/surface_layout.h"
 
 namespace trocar::proto {
 class Barrier;
-class ClaimEvent;
-class Drawing;
 class FineSurfacePart;
 class FrameState;
-class LessonProgress;
-class LessonStage;
-class MarkEvent;
-class RecordingState;
-class Participants;
-class PointEvent;
-class MarkList;
-class SessionPace;
 class SurfaceChange;
 class FrameStatePart;
 class SurfaceFrame;
 class SurfaceSlice;
 class SurfaceTopology;
-class TeachEvent;
-class ViewEvent;
 class Welcome;
 }  // namespace trocar::proto
 
 namespace trocar::replica {
 
 inline constexpr std::size_t kHistoryFrames = 8;  // 128 ms: covers the display delay and its jitter
-inline constexpr std::size_t kMaxNotices = 32;
-inline constexpr std::size_t kMaxRecordingText = 200;
-inline constexpr std::uint64_t kPointerNs = 1'500'000'000;  // as long a pointer stays without news
 
 enum class SyncState : std::uint8_t {
   WaitingForTopology,
@@ -85,7 +71,6 @@ struct ReplicaCounters {
   std::uint64_t crc_mismatches = 0;  // also payloads that do not decode
   std::uint64_t base_mismatches = 0;
   std::uint64_t surface_changes = 0;    // applied
-  std::uint64_t marks = 0;              // set by the instructor, or returned to
   std::uint64_t change_mismatches = 0;  // changes that did not follow, malformed ones included
   std::uint64_t change_bytes = 0;       // of applied changes
   std::uint64_t healed = 0;             // returned to InStep after a mismatch of either kind
@@ -124,8 +109,8 @@ class Replica final : public MessageSink {
   std::uint64_t welcome_count() const { return welcome_count_; }
   // Valid once sync_state() is past WaitingForTopology; `topology_version` counts its changes, the
   // large and the small. It only grows between two values of `history_version`.
-  const Topology& topology() const { return topology_; }
-  std::uint64_t topology_version() const { return topology_version_; }
+  const Topology& topology() const { return surface_.topology(); }
+  std::uint64_t topology_version() const { return surface_.version(); }
   // Returns what is drawn instead of the surface's outside, at rest; null: that itself, or it is
   // not whole yet. Another pointer means another one.
   const std::shared_ptr<const wire::FineSurface>& fine_surface() const { return fine_surface_; }
@@ -134,34 +119,14 @@ class Replica final : public MessageSink {
   std::uint64_t history_version() const { return history_version_; }
   const SessionFrame* newest() const { return history_.empty() ? nullptr : &history_.back(); }
   std::uint32_t surface_crc() const { return surface_crc_; }  // of the newest frame
-  const std::vector<Participant>& participants() const { return participants_; }
-  const Participant* find_participant(ParticipantSlot slot) const;
-  // Latest last; `notice_count` counts all that ever came.
-  const std::deque<Notice>& notices() const { return notices_; }
-  std::uint64_t notice_count() const { return notice_count_; }
-  // Who points where at `now_ns` (monotonic), one entry for each participant.
-  std::vector<Pointer> pointers(std::uint64_t now_ns) const;
-  // Returns what is drawn on the organ; `drawing_version` changes unless lines were only added.
-  const std::vector<Stroke>& strokes() const { return strokes_; }
-  std::uint64_t drawing_version() const { return drawing_version_; }
-  // The lesson that the session gives, if it does.
-  const std::optional<LessonView>& lesson() const { return lesson_; }
-  const SessionPace& pace() const { return pace_; }
-  // Whether the server knows pauses, slow time and marks with names.
-  bool has_pace() const { return server_minor_ >= 18; }
-  // The marks that the organ can be returned to; an empty text is the one without a name.
-  const std::vector<std::string>& marks() const { return marks_; }
-  // Returns where the view to follow was last, if somebody has had it.
-  const std::optional<LedView>& led_view() const { return led_view_; }
-  // Returns what the server last said of its recording.
-  const wire::RecordingState& recording() const { return recording_; }
+  // Returns what the session tells of people and of its lesson.
+  const Told& told() const { return told_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
-  const std::string& goodbye_text() const { return goodbye_text_; }
   const ReplicaCounters& counters() const { return counters_; }
   // When the server published the newest change of the surface that is shown; 0: none, or unknown.
-  std::uint64_t shown_change_us() const { return shown_change_us_; }
+  std::uint64_t shown_change_us() const { return surface_.change_us(); }
   // Share of surface vertices whose displacement exceeded 1 mm in any applied frame, 0 to 1.
-  double share_moved() const;
+  double share_moved() const { return moved_.share(); }
   // How long ago the server published the newest frame, in ms by its clock; nothing if unknown.
   // `server_now_us`: its clock at this moment.
   std::optional<double> age_ms(double server_now_us) const;
@@ -177,20 +142,6 @@ class Replica final : public MessageSink {
   void apply_fine_surface(const proto::FineSurfacePart& message);
   void apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
   void apply_state(const proto::FrameState& message);
-  void apply_participants(const proto::Participants& message);
-  void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
-  void apply_teach(const proto::TeachEvent& message, std::uint64_t arrival_ns);
-  void apply_drawing(const proto::Drawing& message);
-  void apply_lesson(const proto::LessonStage& message);
-  void apply_progress(const proto::LessonProgress& message);
-  void apply_pace(const proto::SessionPace& message);
-  void apply_marks(const proto::MarkList& message);
-  void apply_view(const proto::ViewEvent& message, std::uint64_t arrival_ns);
-  void tell_all(Tick tick, const std::string& text, bool is_refused, std::uint64_t arrival_ns);
-  void add_notice(Notice notice);
-  void apply_recording(const proto::RecordingState& message);
-  void apply_point(const proto::PointEvent& message, std::uint64_t arrival_ns);
-  void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   void apply_slice(const proto::SurfaceSlice& message, std::uint64_t arrival_ns);
   void apply_state_part(const proto::FrameStatePart& message);
   // Decodes into scratch_ and scratch_blood_.
@@ -206,12 +157,10 @@ class Replica final : public MessageSink {
   // scratch_ and scratch_blood_ are right.
   void accept_frame(const FrameHeader& header, std::uint64_t arrival_ns);
   void show_frame(const FrameHeader& header, std::uint64_t arrival_ns);
-  // These take the layout over from the stream to be shown: all of it, or what changed.
-  void show_layout();
-  void show_changes();
+  // Another surface begins.
+  void show_anew();
   // Gives the history's frames the new vertices, `surface` being the next frame after them.
   void extend_history(const wire::QuantisedSurface& surface);
-  void count_moved();
   void need_keyframe(Frame frame);
   void answer_barrier();
   void fail(std::string what);
@@ -221,13 +170,7 @@ class Replica final : public MessageSink {
   SyncState sync_state_ = SyncState::WaitingForTopology;
   ParticipantSlot own_slot_;
   std::uint64_t welcome_count_ = 0;
-  wire::SurfaceLayout layout_;  // of the stream; ahead of topology_ until the next frame
-  std::string organ_name_;
-  bool is_layout_new_ = false;                // topology_ is to be replaced by it
-  std::vector<wire::SurfaceChange> to_show_;  // else topology_ lacks these
-  Topology topology_;
-  std::uint64_t newest_change_us_ = 0, shown_change_us_ = 0;
-  std::uint64_t topology_version_ = 0;
+  ShownSurface surface_;
   wire::FineSurfaceAssembler fine_parts_;
   std::shared_ptr<const wire::FineSurface> fine_surface_;
   std::deque<SessionFrame> history_;
@@ -239,26 +182,12 @@ class Replica final : public MessageSink {
   std::unique_ptr<proto::FrameState> early_state_;  // its surface is still under way
   std::uint32_t surface_crc_ = 0;
   bool request_pending_ = false;  // a KeyframeRequest that could not be queued yet
-  std::vector<Participant> participants_;
-  std::deque<Notice> notices_;
-  std::uint64_t notice_count_ = 0;
-  wire::RecordingState recording_;
-  std::vector<Pointer> pointers_;  // one of a participant at most
-  std::vector<Stroke> strokes_;
-  std::uint64_t drawing_version_ = 0;
-  std::optional<LedView> led_view_;
-  SessionPace pace_;
-  std::uint32_t server_minor_ = 0;
-  std::vector<std::string> marks_;
-  std::optional<LessonView> lesson_;
-  std::size_t lesson_strokes_ = 0;  // of strokes_, the first ones: the line of a stage
+  Told told_;
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;
-  std::string goodbye_text_;
   ReplicaCounters counters_;
   std::uint64_t deltas_seen_ = 0, corrupt_at_ = 0;
-  std::vector<std::uint8_t> has_moved_;  // per vertex slot
-  std::size_t moved_count_ = 0;
+  MovedShare moved_;
 };
 
 }  // namespace trocar::replica

@@ -8,6 +8,7 @@
 #include "common/base/spawn.h"
 #include "common/impair/datagram_relay.h"
 #include "common/impair/stream_relay.h"
+#include "common/intake/acceptor.h"
 
 namespace trocar::impair {
 namespace {
@@ -29,12 +30,10 @@ class Proxy::Core : public std::enable_shared_from_this<Proxy::Core> {
   Status open() {
     if (const auto found = find_server(); !found) return found;
     const auto& options = network->options;
+    if (auto checked = intake::check_address(options.listen_address, "--listen"); !checked)
+      return checked;
+    const auto address = asio::ip::make_address(options.listen_address);
     boost::system::error_code error;
-    const auto address = asio::ip::make_address(options.listen_address, error);
-    if (error)
-      return Error{ErrorCode::Usage, "--listen: '" + options.listen_address +
-                                         "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
-                                         "machine only, 0.0.0.0 for any"};
     for (int i = 0; i < (options.listen_port == 0 ? kPortTries : 1); ++i) {
       error = bind(address);
       if (!error) return {};

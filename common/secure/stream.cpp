@@ -108,6 +108,14 @@ asio::awaitable<Transfer> Stream::write_all(const std::vector<asio::const_buffer
   co_return done;
 }
 
+void Stream::read_some(asio::mutable_buffer to, Done done) {
+  std::visit([&](auto& below) { below.async_read_some(to, std::move(done)); }, content_);
+}
+
+void Stream::write_some(asio::const_buffer from, Done done) {
+  std::visit([&](auto& below) { below.async_write_some(from, std::move(done)); }, content_);
+}
+
 std::string describe_handshake_failure(const boost::system::error_code& error) {
   if (error.category() != asio::error::get_ssl_category()) return error.message();
   switch (ERR_GET_REASON(static_cast<unsigned long>(error.value()))) {

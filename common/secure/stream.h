@@ -13,6 +13,7 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/stream.hpp>
+#include <functional>
 #include <optional>
 #include <string>
 #include <variant>
@@ -57,6 +58,10 @@ class Stream {
   asio::awaitable<Transfer> read_all(asio::mutable_buffer to);
   // `buffers` live until it is done.
   asio::awaitable<Transfer> write_all(const std::vector<asio::const_buffer>& buffers);
+  // For who has no coroutine: `done` is called on the socket's executor.
+  using Done = std::function<void(boost::system::error_code, std::size_t)>;
+  void read_some(asio::mutable_buffer to, Done done);
+  void write_some(asio::const_buffer from, Done done);
 
  private:
   using TlsStream = asio::ssl::stream<Socket>;

@@ -4,6 +4,7 @@
 
 #include "server/python/arrays.h"
 #include "server/python/errors.h"
+#include "server/session/replication/lesson_messages.h"
 #include "server/tissue/contact/proxies.h"
 #include "server/tissue/hands/sampling.h"
 
@@ -45,7 +46,8 @@ py::array shared_view(const std::shared_ptr<std::vector<float>>& numbers) {
 }  // namespace
 
 Session::Session(const organ::Organ& organ, unsigned threads, std::optional<lesson::Lesson> lesson)
-    : simulation_(organ, threads, lesson ? rules_of(*lesson) : step::SceneRules{}),
+    : simulation_(organ, threads,
+                  {.bleeding = replication::bleeding_rules(lesson ? &*lesson : nullptr, false)}),
       decisions_(simulation_.with_sweeps_for_organ({})) {
   if (lesson) course_.emplace(*std::move(lesson));
   tick_hash_ = simulation_.state_hash();

@@ -26,20 +26,6 @@ py::dict told_result(const lesson::StageResult& result) {
 
 }  // namespace
 
-step::SceneRules rules_of(const lesson::Lesson& lesson) {
-  if (!lesson.bleeds) return {};
-  bleeding::Rules rules;
-  for (const auto& structure : lesson.structures)
-    if (structure.vessel_pressure_pa > 0)
-      rules.vessels.push_back({.name = structure.name,
-                               .from_m = structure.from_m,
-                               .to_m = structure.to_m,
-                               .radius_m = structure.radius_m,
-                               .pressure_pa = structure.vessel_pressure_pa,
-                               .most_flow_m3_s = structure.vessel_flow_m3_s});
-  return {.bleeding = std::move(rules)};
-}
-
 void SessionCourse::observe(std::shared_ptr<const step::PublishedFrame> frame,
                             const wire::SurfaceLayout& layout) {
   if (!frame_ && frame->tools.empty()) return;

@@ -11,12 +11,8 @@
 
 #include "common/lesson/course.h"
 #include "server/tissue/step/published_frame.h"
-#include "server/tissue/step/tick.h"
 
 namespace trocar::python {
-
-// The vessels of a lesson that bleeds, and how it does; nothing: it does not.
-step::SceneRules rules_of(const lesson::Lesson& lesson);
 
 class SessionCourse {
  public:

@@ -14,13 +14,12 @@
 #include <thread>
 #include <vector>
 
-#include "server/session/monitoring/http_acceptor.h"
-#include "server/session/monitoring/http_stream.h"
+#include "common/http/stream.h"
+#include "common/intake/acceptor.h"
 
 namespace trocar::agones {
 namespace {
 
-namespace http = boost::beast::http;
 using std::chrono::milliseconds;
 
 // A sidecar answers {} to what it is told, and a description of the game server.
@@ -31,44 +30,37 @@ constexpr const char* kGameServer =
 
 // Takes requests on the test's only I/O context.
 struct FakeSidecar {
-  explicit FakeSidecar(asio::io_context& io) : acceptor(std::make_shared<Held>(io)) {}
-
-  struct Held : monitoring::HttpAcceptor {
-    explicit Held(asio::io_context& io) : HttpAcceptor(io, 8) {}
-  };
+  explicit FakeSidecar(asio::io_context& io) : acceptor(io, {.most = 8}) {}
 
   std::uint16_t open(std::uint16_t port = 0) {
-    EXPECT_TRUE(acceptor->open("127.0.0.1", port, "test").ok());
-    acceptor->start([this](asio::ip::tcp::socket socket) { return serve(std::move(socket)); },
-                    acceptor);
-    return acceptor->port();
+    EXPECT_TRUE(acceptor.open("127.0.0.1", port, "test").ok());
+    acceptor.start([this](auto socket, auto) { return serve(std::move(socket)); });
+    return acceptor.port();
   }
 
   asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
-    monitoring::HttpStream stream(std::move(socket), nullptr);
-    http::request_parser<http::string_body> parser;
-    const auto failed = co_await stream.read(parser);
-    if (failed) co_return;
-    const auto& request = parser.get();
-    const auto what = std::string(request.method_string()) + " " + std::string(request.target());
-    if (what.starts_with("POST")) {
-      EXPECT_EQ(request.body(), "{}");
+    http::Stream stream(std::move(socket), nullptr);
+    http::Request request;
+    const auto read = co_await stream.read(request, {.body_bytes = 4096});
+    if (read != http::Reading::Whole) co_return;
+    const auto what = request.method + " " + request.target;
+    if (request.method == "POST") {
+      EXPECT_EQ(request.body, "{}");
     }
-    EXPECT_EQ(request[http::field::content_type], "application/json");
-    monitoring::HttpResponse answer(
-        refusals > 0 ? http::status::internal_server_error : http::status::ok, request.version());
-    if (refusals > 0)
+    EXPECT_EQ(request.field("Content-Type"), "application/json");
+    http::Answer answer{.body = what == "GET /gameserver" ? kGameServer : "{}"};
+    if (refusals > 0) {
       --refusals;
-    else
+      answer.status = 500;
+    } else {
       told.push_back(what);
-    answer.body() = what == "GET /gameserver" ? kGameServer : "{}";
-    answer.keep_alive(false);
-    answer.prepare_payload();
-    co_await stream.write(answer);
+    }
+    request.keeps_alive = false;
+    co_await stream.write(request, answer);
     stream.shut_down();
   }
 
-  std::shared_ptr<Held> acceptor;
+  intake::Acceptor acceptor;
   std::vector<std::string> told;
   int refusals = 0;
 };
@@ -131,7 +123,7 @@ TEST_F(Agones, ASidecarMayComeLateAndSayNoAtFirst) {
   {
     FakeSidecar first(io_);
     port = first.open();
-    first.acceptor->stop();
+    first.acceptor.stop();
     io_.run_for(milliseconds(50));
     io_.restart();
   }

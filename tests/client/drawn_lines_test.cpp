@@ -50,13 +50,13 @@ TEST(DrawnLines, TheReplicaKeepsWhatIsDrawn) {
   Replica replica([](const proto::Envelope&) { return true; });
   replica.on_message(drawing(true, {100, 0, 0, 10, -5, 0}), 0, 0);
   replica.on_message(drawing(true, {1, 2, 3}), 0, 0);
-  ASSERT_EQ(replica.strokes().size(), 2u);
-  EXPECT_FLOAT_EQ(replica.strokes()[0].rest_m[1].x, 110 * 32e-6f);
-  EXPECT_FLOAT_EQ(replica.strokes()[0].rest_m[1].y, -5 * 32e-6f);
-  const auto version = replica.drawing_version();
+  ASSERT_EQ(replica.told().strokes().size(), 2u);
+  EXPECT_FLOAT_EQ(replica.told().strokes()[0].rest_m[1].x, 110 * 32e-6f);
+  EXPECT_FLOAT_EQ(replica.told().strokes()[0].rest_m[1].y, -5 * 32e-6f);
+  const auto version = replica.told().drawing_version();
   replica.on_message(drawing(false, {7, 8, 9}), 0, 0);
-  EXPECT_EQ(replica.strokes().size(), 1u);
-  EXPECT_NE(replica.drawing_version(), version);
+  EXPECT_EQ(replica.told().strokes().size(), 1u);
+  EXPECT_NE(replica.told().drawing_version(), version);
   EXPECT_TRUE(replica.fault().ok());
 }
 

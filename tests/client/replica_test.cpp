@@ -56,7 +56,7 @@ TEST_F(ReplicaTest, FollowsTheServerBitForBit) {
   EXPECT_GT(replica_.counters().changed_vertices, 0u);
   EXPECT_GT(replica_.share_moved(), 0.0);
   EXPECT_LT(replica_.share_moved(), 1.0);
-  EXPECT_EQ(replica_.participants().size(), 4u);
+  EXPECT_EQ(replica_.told().participants().size(), 4u);
   EXPECT_EQ(replica_.own_slot().value, 2);
   EXPECT_EQ(replica_.newest()->regions.size(), source_.surface().size());
   EXPECT_EQ(replica_.newest()->tools.size(), 2u);
@@ -397,8 +397,8 @@ TEST_F(ReplicaTest, KeepsWhoIsAway) {
   entry.set_slot(1);
   entry.set_is_away(true);
   replica_.on_message(message, 0, 0);
-  ASSERT_EQ(replica_.participants().size(), 1u);
-  EXPECT_TRUE(replica_.participants()[0].is_away);
+  ASSERT_EQ(replica_.told().participants().size(), 1u);
+  EXPECT_TRUE(replica_.told().participants()[0].is_away);
 }
 
 TEST_F(ReplicaTest, APointerStaysAsLongAsThereIsNewsOfIt) {
@@ -408,13 +408,13 @@ TEST_F(ReplicaTest, APointerStaysAsLongAsThereIsNewsOfIt) {
   constexpr std::uint64_t kNow = 5'000'000'000;
   replica_.on_message(message, kNow, 20);
   replica_.on_message(message, kNow + 1, 20);
-  ASSERT_EQ(replica_.pointers(kNow + 2).size(), 1u);
-  EXPECT_EQ(replica_.pointers(kNow + 2)[0].participant.value, 17);
-  EXPECT_FLOAT_EQ(replica_.pointers(kNow + 2)[0].position_m.y, 0.02f);
-  EXPECT_TRUE(replica_.pointers(kNow + 1 + kPointerNs).empty());
+  ASSERT_EQ(replica_.told().pointers(kNow + 2).size(), 1u);
+  EXPECT_EQ(replica_.told().pointers(kNow + 2)[0].participant.value, 17);
+  EXPECT_FLOAT_EQ(replica_.told().pointers(kNow + 2)[0].position_m.y, 0.02f);
+  EXPECT_TRUE(replica_.told().pointers(kNow + 1 + kPointerNs).empty());
   message.mutable_point_event()->clear_position_m();
   replica_.on_message(message, kNow + 2, 20);
-  EXPECT_TRUE(replica_.pointers(kNow + 2).empty());
+  EXPECT_TRUE(replica_.told().pointers(kNow + 2).empty());
   message.mutable_point_event()->set_participant(kMaxParticipants);
   replica_.on_message(message, kNow + 3, 20);
   EXPECT_FALSE(replica_.fault().ok());
@@ -422,7 +422,7 @@ TEST_F(ReplicaTest, APointerStaysAsLongAsThereIsNewsOfIt) {
 
 TEST_F(ReplicaTest, KeepsWhatTheServerSaysOfItsRecording) {
   start();
-  EXPECT_EQ(replica_.recording().status, wire::RecordingStatus::Unknown);
+  EXPECT_EQ(replica_.told().recording().status, wire::RecordingStatus::Unknown);
   proto::Envelope message;
   auto& state = *message.mutable_recording_state();
   state.set_status(proto::RECORDING_GAPPED);
@@ -430,12 +430,12 @@ TEST_F(ReplicaTest, KeepsWhatTheServerSaysOfItsRecording) {
   state.set_text(std::string(1000, 'x'));
   replica_.on_message(message, 0, 0);
   advance(100);
-  EXPECT_TRUE(replica_.recording().is_damaged()) << "it stays, whatever comes";
-  EXPECT_EQ(replica_.recording().frames_missing, 7u);
-  EXPECT_EQ(replica_.recording().text.size(), kMaxRecordingText);
+  EXPECT_TRUE(replica_.told().recording().is_damaged()) << "it stays, whatever comes";
+  EXPECT_EQ(replica_.told().recording().frames_missing, 7u);
+  EXPECT_EQ(replica_.told().recording().text.size(), kMaxRecordingText);
   state.set_status(static_cast<proto::RecordingStatus>(77));
   replica_.on_message(message, 0, 0);
-  EXPECT_EQ(replica_.recording().status, wire::RecordingStatus::Unknown);
+  EXPECT_EQ(replica_.told().recording().status, wire::RecordingStatus::Unknown);
   EXPECT_TRUE(replica_.fault().ok());
 }
 

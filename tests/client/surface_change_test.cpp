@@ -83,11 +83,11 @@ TEST_F(SurfaceChangeTest, DrawnLinesStayWhereTheyAreAcrossCuts) {
     advance(1);
     ASSERT_NO_FATAL_FAILURE(expect_in_step());
     lines.update(replica_, rest());
-    ASSERT_EQ(lines.lines().size(), replica_.strokes().size());
+    ASSERT_EQ(lines.lines().size(), replica_.told().strokes().size());
     for (std::size_t k = 0; k < lines.lines().size(); ++k) {
       const auto& point = lines.lines()[k].points[0];
       if (point.normal == Vec3f{}) continue;  // its tissue is gone
-      ASSERT_LT(length(point.position - replica_.strokes()[k].rest_m[0]), 0.0041f);
+      ASSERT_LT(length(point.position - replica_.told().strokes()[k].rest_m[0]), 0.0041f);
     }
   }
 }

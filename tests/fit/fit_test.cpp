@@ -31,12 +31,7 @@ box_min_mm = [-12, 12, -12]
 box_max_mm = [12, 12, 12]
 [[displace]]
 set = "plate"
-[[displace.key]]
-time_s = 0
-displacement_mm = [0, 0, 0]
-[[displace.key]]
-time_s = 0.1
-displacement_mm = [0, 4, 0]
+key = [{time_s = 0, displacement_mm = [0, 0, 0]}, {time_s = 0.1, displacement_mm = [0, 4, 0]}]
 [[probe]]
 set = "plate"
 quantity = "reaction"
@@ -145,14 +140,8 @@ spacing_mm = 8
 [[tool]]
 radius_mm = 12
 ease = "linear"
-[[tool.key]]
-time_s = 0
-position_mm = [0, 12, 0]
-shaft = [0, 1, 0]
-verb = "push"
-[[tool.key]]
-time_s = 1
-position_mm = [0, 10, 0]
+key = [{time_s = 0, position_mm = [0, 12, 0], shaft = [0, 1, 0], verb = "push"},
+       {time_s = 1, position_mm = [0, 10, 0]}]
 [run]
 mode = "static"
 seconds = 1

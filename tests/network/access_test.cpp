@@ -7,8 +7,8 @@
 #include <boost/asio/ssl/stream.hpp>
 #include <functional>
 
-#include "client/net/net_source.h"
 #include "common/secure/private_files.h"
+#include "tests/network/collector.h"
 #include "tests/network/tls_fixture.h"
 
 namespace trocar::testing {
@@ -17,22 +17,6 @@ namespace {
 using replica::CloseKind;
 using replica::SourceState;
 using wire::Role;
-
-struct Collector final : replica::MessageSink {
-  void on_message(const proto::Envelope& message, std::uint64_t, std::size_t) override {
-    messages.push_back(message);
-  }
-  std::vector<proto::Envelope> messages;
-};
-
-bool poll_until(net::NetSource& source, Collector& sink, const std::function<bool()>& is_done) {
-  for (int i = 0; i < 10'000; ++i) {
-    source.poll(sink);
-    if (is_done()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return false;
-}
 
 net::NetSourceOptions options_for(std::uint16_t port, const std::string& name, Role role,
                                   std::optional<secure::JoinCode> code) {
@@ -105,44 +89,31 @@ TEST(Access, a_session_goes_through_tls_from_the_code_to_the_goodbye) {
   EXPECT_EQ(source.close_reason().kind, CloseKind::Ended);
 }
 
-TEST(Access, one_observers_code_does_not_take_all_places) {
+// With 10 places for watchers so many come with one code, and the next is told that.
+void expect_places_of_one_code(Role role, int places, const std::string& told) {
   replication::ReplicatorOptions few;
   few.places = {.watchers = 10};
   GuardedSession guarded(-1, tls_options(), few);
   guarded.session->publish(10);
   std::vector<std::unique_ptr<net::NetSource>> crowd;
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < places; ++i) {
     Collector sink;
-    auto& one = *crowd.emplace_back(std::make_unique<net::NetSource>(
-        options_for(guarded.session->port(), "observer " + std::to_string(i), Role::Observer,
-                    guarded.code(Role::Observer))));
+    auto& one = *crowd.emplace_back(std::make_unique<net::NetSource>(options_for(
+        guarded.session->port(), "watcher " + std::to_string(i), role, guarded.code(role))));
     ASSERT_TRUE(poll_until(one, sink, [&] { return one.state() == SourceState::Live; }));
   }
-  const auto late = try_to_join(guarded, "late", Role::Observer, guarded.code(Role::Observer));
+  const auto late = try_to_join(guarded, "late", role, guarded.code(role));
   EXPECT_EQ(late.reason, proto::GOODBYE_FULL);
-  EXPECT_NE(late.text.find("5 observers with this code"), std::string::npos) << late.text;
-  EXPECT_TRUE(try_to_join(guarded, "Ada", Role::Surgeon, guarded.code(Role::Surgeon)).is_in);
-  EXPECT_TRUE(try_to_join(guarded, "Ivy", Role::Instructor, guarded.code(Role::Instructor)).is_in);
+  EXPECT_NE(late.text.find(told), std::string::npos) << late.text;
+  for (const auto other : {Role::Surgeon, Role::Instructor, Role::Observer})
+    if (other != role) {
+      EXPECT_TRUE(try_to_join(guarded, "Ada", other, guarded.code(other)).is_in);
+    }
 }
 
-TEST(Access, one_instructors_code_does_not_take_all_places) {
-  replication::ReplicatorOptions few;
-  few.places = {.watchers = 10};
-  GuardedSession guarded(-1, tls_options(), few);
-  guarded.session->publish(10);
-  std::vector<std::unique_ptr<net::NetSource>> crowd;
-  for (int i = 0; i < 3; ++i) {
-    Collector sink;
-    auto& one = *crowd.emplace_back(std::make_unique<net::NetSource>(
-        options_for(guarded.session->port(), "instructor " + std::to_string(i), Role::Instructor,
-                    guarded.code(Role::Instructor))));
-    ASSERT_TRUE(poll_until(one, sink, [&] { return one.state() == SourceState::Live; }));
-  }
-  const auto late = try_to_join(guarded, "late", Role::Instructor, guarded.code(Role::Instructor));
-  EXPECT_EQ(late.reason, proto::GOODBYE_FULL);
-  EXPECT_NE(late.text.find("3 instructors with this code"), std::string::npos) << late.text;
-  EXPECT_TRUE(try_to_join(guarded, "Ada", Role::Surgeon, guarded.code(Role::Surgeon)).is_in);
-  EXPECT_TRUE(try_to_join(guarded, "Otto", Role::Observer, guarded.code(Role::Observer)).is_in);
+TEST(Access, one_code_does_not_take_all_places) {
+  expect_places_of_one_code(Role::Observer, 5, "5 observers with this code");
+  expect_places_of_one_code(Role::Instructor, 3, "3 instructors with this code");
 }
 
 TEST(Access, frames_larger_than_a_record_of_tls_arrive_whole) {

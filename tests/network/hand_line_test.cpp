@@ -76,6 +76,14 @@ step::SharedFrame felt_frame(LiveSession& session, std::uint64_t echo_us) {
   return frame;
 }
 
+net::NetSourceOptions options_for(LiveSession& session, RestlessHand& hand) {
+  net::NetSourceOptions options;
+  options.port = session.port();
+  options.participant_name = "Anna";
+  options.hands = &hand;
+  return options;
+}
+
 std::uint64_t samples_at(LiveSession& session) {
   return session.on_io([&] { return session.replicator().counters().samples; });
 }
@@ -84,11 +92,7 @@ TEST(HandLine, goes_on_over_the_stream_while_nobody_polls) {
   LiveSession session({}, with_a_law());
   session.publish(10);
   RestlessHand hand;
-  net::NetSourceOptions options;
-  options.port = session.port();
-  options.participant_name = "Anna";
-  options.hands = &hand;
-  net::NetSource source(options);
+  net::NetSource source(options_for(session, hand));
   replica::Replica replica([&](const proto::Envelope& message) { return source.send(message); });
   ASSERT_TRUE(wait_until([&] {
     source.poll(replica);
@@ -149,11 +153,7 @@ TEST(HandLine, comes_back_with_the_connection) {
   LiveSession session({}, with_a_law());
   session.publish(10);
   RestlessHand hand;
-  net::NetSourceOptions options;
-  options.port = session.port();
-  options.participant_name = "Anna";
-  options.hands = &hand;
-  net::NetSource source(options);
+  net::NetSource source(options_for(session, hand));
   ASSERT_TRUE(wait_until([&] { return samples_at(session) >= 20; }));
   session.on_io([&] { session.tcp().close(1); });
   ASSERT_TRUE(wait_until([&] {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "tests/network/collector.h"
 #include "tests/network/session_fixture.h"
 
 namespace trocar::testing {
@@ -13,20 +14,6 @@ namespace {
 using replica::CloseKind;
 using replica::SourceState;
 
-// Keeps what it is given.
-struct Collector final : replica::MessageSink {
-  void on_message(const proto::Envelope& message, std::uint64_t, std::size_t) override {
-    messages.push_back(message);
-  }
-  std::vector<proto::Envelope> messages;
-
-  std::size_t count(proto::Envelope::MessageCase kind) const {
-    return static_cast<std::size_t>(
-        std::count_if(messages.begin(), messages.end(),
-                      [kind](const auto& message) { return message.message_case() == kind; }));
-  }
-};
-
 net::NetSourceOptions options_for(std::uint16_t port, const std::string& name) {
   net::NetSourceOptions options;
   options.port = port;
@@ -34,16 +21,6 @@ net::NetSourceOptions options_for(std::uint16_t port, const std::string& name) {
   options.connect_deadline = std::chrono::milliseconds(3000);
   options.ping_interval = std::chrono::milliseconds(20);
   return options;
-}
-
-// Polls until `is_done`; false after 10 s.
-bool poll_until(net::NetSource& source, Collector& sink, const std::function<bool()>& is_done) {
-  for (int i = 0; i < 10'000; ++i) {
-    source.poll(sink);
-    if (is_done()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return false;
 }
 
 TEST(NetSource, joins_and_gets_everything_in_order_with_round_trips) {

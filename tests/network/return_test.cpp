@@ -8,9 +8,9 @@
 #include <functional>
 
 #include "client/net/comeback.h"
-#include "client/net/net_source.h"
 #include "common/secure/digest.h"
 #include "common/secure/stream.h"
+#include "tests/network/collector.h"
 #include "tests/network/tls_fixture.h"
 
 namespace trocar::testing {
@@ -20,28 +20,6 @@ using replica::CloseKind;
 using replica::SourceState;
 using std::chrono::milliseconds;
 using wire::Role;
-
-struct Collector final : replica::MessageSink {
-  void on_message(const proto::Envelope& message, std::uint64_t, std::size_t) override {
-    messages.push_back(message);
-  }
-  std::vector<proto::Envelope> messages;
-
-  std::size_t count(proto::Envelope::MessageCase kind) const {
-    return static_cast<std::size_t>(
-        std::count_if(messages.begin(), messages.end(),
-                      [kind](const auto& message) { return message.message_case() == kind; }));
-  }
-};
-
-bool poll_until(net::NetSource& source, Collector& sink, const std::function<bool()>& is_done) {
-  for (int i = 0; i < 20'000; ++i) {
-    source.poll(sink);
-    if (is_done()) return true;
-    std::this_thread::sleep_for(milliseconds(1));
-  }
-  return false;
-}
 
 bool becomes(net::NetSource& source, Collector& sink, SourceState state) {
   return poll_until(source, sink, [&] { return source.state() == state; });

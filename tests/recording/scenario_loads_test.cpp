@@ -58,42 +58,21 @@ box_min_mm = [-15, -10, -15]
 box_max_mm = [15, 10, -15]
 [[displace]]
 set = "top"
-[[displace.key]]
-time_s = 0.3
-displacement_mm = [0, 0, 0]
-[[displace.key]]
-time_s = 1
-displacement_mm = [1.1, 2.3, 0]
+key = [{time_s = 0.3, displacement_mm = [0, 0, 0]}, {time_s = 1, displacement_mm = [1.1, 2.3, 0]}]
 [[displace]]
 set = "right"
 axes = "x"
 [[force]]
 set = "front"
-[[force.key]]
-time_s = 0
-force_n = [0, 0, 0]
-[[force.key]]
-time_s = 0.5
-force_n = [0.01, 0, 0.07]
+key = [{time_s = 0, force_n = [0, 0, 0]}, {time_s = 0.5, force_n = [0.01, 0, 0.07]}]
 [[traction]]
 set = "back"
-[[traction.key]]
-time_s = 0
-pressure_pa = 0
-[[traction.key]]
-time_s = 2
-pressure_pa = 150
+key = [{time_s = 0, pressure_pa = 0}, {time_s = 2, pressure_pa = 150}]
 [[tool]]
 radius_mm = 1
 edge_mm = 30
-[[tool.key]]
-time_s = 0
-position_mm = [-30, 2, 0]
-shaft = [0, 1, 0]
-verb = "cut"
-[[tool.key]]
-time_s = 0.2
-position_mm = [30, 2, 0]
+key = [{time_s = 0, position_mm = [-30, 2, 0], shaft = [0, 1, 0], verb = "cut"},
+       {time_s = 0.2, position_mm = [30, 2, 0]}]
 [[probe]]
 set = "fixed"
 quantity = "reaction"
@@ -118,14 +97,8 @@ elastic_law = "measured"
 measured = "human_liver_nava2008"
 [[tool]]
 radius_mm = 4
-[[tool.key]]
-time_s = 0
-position_mm = [0, 10, 0]
-shaft = [0, 1, 0]
-verb = "push"
-[[tool.key]]
-time_s = 0.2
-position_mm = [0, 6, 0]
+key = [{time_s = 0, position_mm = [0, 10, 0], shaft = [0, 1, 0], verb = "push"},
+       {time_s = 0.2, position_mm = [0, 6, 0]}]
 [[probe]]
 set = "fixed"
 quantity = "reaction"
@@ -145,14 +118,8 @@ elastic_law = "neo-hookean"
 m_s2 = [0, -9.81, 0]
 [[tool]]
 radius_mm = 4
-[[tool.key]]
-time_s = 0
-position_mm = [0, 20, 0]
-shaft = [0, 1, 0]
-verb = "push"
-[[tool.key]]
-time_s = 0.2
-position_mm = [0, 8, 0]
+key = [{time_s = 0, position_mm = [0, 20, 0], shaft = [0, 1, 0], verb = "push"},
+       {time_s = 0.2, position_mm = [0, 8, 0]}]
 [run]
 start = "equilibrium"
 seconds = 0.32

@@ -124,10 +124,10 @@ TEST_F(PairedSourceTest, StagesBeginTogetherWhereBothHaveThem) {
     expect_aligned();
     if (pair_->place(0).is_waiting && pair_->place(0).tick < 60 * kTicksPerFrame) {
       step(0);
-      EXPECT_FALSE(replicas_[0]->lesson()) << "its stage has not begun";
+      EXPECT_FALSE(replicas_[0]->told().lesson()) << "its stage has not begun";
     }
     has_waited = has_waited || (pair_->place(0).is_waiting && !pair_->place(0).has_ended);
-    const auto lessons = std::array{replicas_[0]->lesson(), replicas_[1]->lesson()};
+    const auto lessons = std::array{replicas_[0]->told().lesson(), replicas_[1]->told().lesson()};
     if (pair_->position() % kTicksPerFrame == 0 && lessons[0] && lessons[1]) {
       EXPECT_EQ(lessons[0]->is_over, lessons[1]->is_over) << pair_->position();
     }

@@ -34,8 +34,8 @@ TEST_F(ReplaySourceTest, PlaysEveryFrameBitForBit) {
     ASSERT_EQ(player.source->position(), frame * kTicksPerFrame);
     ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
     ASSERT_EQ(player.replica.newest()->arrival_ns, player.now_ns);
-    ASSERT_EQ(player.replica.notice_count(), frame >= 90 ? 1u : 0u);
-    ASSERT_EQ(player.replica.participants().size(), frame >= 200 ? 2u : 1u);
+    ASSERT_EQ(player.replica.told().notice_count(), frame >= 90 ? 1u : 0u);
+    ASSERT_EQ(player.replica.told().participants().size(), frame >= 200 ? 2u : 1u);
   }
   // The observer has a slot that nobody in the recording had.
   EXPECT_EQ(player.replica.own_slot().value, kMaxHands + 1);
@@ -114,7 +114,7 @@ TEST_F(ReplaySourceTest, SeeksToAnyTickForwardAndBack) {
     player.step(3);
     ASSERT_EQ(player.source->position(), target);
     ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth)) << "seek " << i << " to " << target;
-    ASSERT_EQ(player.replica.participants().size(), target >= 200 * 16 ? 2u : 1u);
+    ASSERT_EQ(player.replica.told().participants().size(), target >= 200 * 16 ? 2u : 1u);
     ASSERT_LE(player.replica.newest()->arrival_ns, player.now_ns);
     if (i % 4 != 0) continue;
     player.source->play();
@@ -203,7 +203,7 @@ TEST_F(ReplaySourceTest, SeekDeliversOneKeyframeAndNoClaims) {
   EXPECT_EQ(player.replica.newest()->frame, 280u);
   EXPECT_EQ(player.replica.counters().keyframes, 2u);
   EXPECT_EQ(player.replica.counters().frames, 1u + (280 - 249) + 1);
-  EXPECT_EQ(player.replica.notice_count(), 0u);
+  EXPECT_EQ(player.replica.told().notice_count(), 0u);
   // All that the replica remembers has its state, and the times lie a frame apart.
   const auto& history = player.replica.history();
   ASSERT_EQ(history.size(), replica::kHistoryFrames);
@@ -312,7 +312,7 @@ TEST_F(ReplaySourceTest, SaysWhichStageOfALessonWasOn) {
     player.source->seek(frame * kTicksPerFrame);
     player.step(3);
     ASSERT_TRUE(player.replica.fault().ok()) << player.replica.fault().error().message;
-    const auto& lesson = player.replica.lesson();
+    const auto& lesson = player.replica.told().lesson();
     ASSERT_EQ(lesson.has_value(), frame >= 100) << frame;
     if (!lesson) continue;
     EXPECT_EQ(lesson->name, "Search");

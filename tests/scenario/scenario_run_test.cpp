@@ -20,9 +20,7 @@ namespace {
 TEST(ScenarioRun, AColumnUnderAForceStretchesLikeSpringsInSeries) {
   const auto run = make(kColumn + R"([[force]]
 set = "top"
-[[force.key]]
-time_s = 0
-force_n = [0, 0.4, 0]
+key = [{time_s = 0, force_n = [0, 0.4, 0]}]
 [run]
 seconds = 4
 [[probe]]
@@ -43,12 +41,7 @@ quantity = "reaction"
 TEST(ScenarioRun, TheReactionOfADisplacedSetEqualsTheForceOfTheSameStretch) {
   const auto run = make(kColumn + R"([[displace]]
 set = "top"
-[[displace.key]]
-time_s = 0
-displacement_mm = [0, 0, 0]
-[[displace.key]]
-time_s = 0.2
-displacement_mm = [0, 12.5, 0]
+key = [{time_s = 0, displacement_mm = [0, 0, 0]}, {time_s = 0.2, displacement_mm = [0, 12.5, 0]}]
 [run]
 seconds = 3
 [[probe]]
@@ -99,12 +92,7 @@ quantity = "reaction"
 TEST(ScenarioRun, AStaticRunIsInEquilibriumAtEachLoadStep) {
   const auto run = make(kColumn + R"([[force]]
 set = "top"
-[[force.key]]
-time_s = 0
-force_n = [0, 0, 0]
-[[force.key]]
-time_s = 1
-force_n = [0, 0.4, 0]
+key = [{time_s = 0, force_n = [0, 0, 0]}, {time_s = 1, force_n = [0, 0.4, 0]}]
 [run]
 mode = "static"
 seconds = 1
@@ -145,12 +133,7 @@ nearest_mm = [5, 70, 5]
 radius_mm = 14.2
 [[force]]
 set = "patch"
-[[force.key]]
-time_s = 0
-force_n = [0, 0, 0]
-[[force.key]]
-time_s = 1
-force_n = [0, 0.05, 0]
+key = [{time_s = 0, force_n = [0, 0, 0]}, {time_s = 1, force_n = [0, 0.05, 0]}]
 [run]
 mode = "static"
 seconds = 1
@@ -185,14 +168,8 @@ source = "liver"
 [[tool]]
 radius_mm = 15
 anchor = [0, 1, 0]
-[[tool.key]]
-time_s = 0
-position_mm = [0, 10, 0]
-shaft = [0, 1, 0]
-verb = "push"
-[[tool.key]]
-time_s = 1
-position_mm = [0, -5, 0]
+key = [{time_s = 0, position_mm = [0, 10, 0], shaft = [0, 1, 0], verb = "push"},
+       {time_s = 1, position_mm = [0, -5, 0]}]
 [run]
 mode = "static"
 seconds = 1
@@ -277,9 +254,7 @@ quantity = "displacement"
 TEST(ScenarioRun, TensionPullsAtWhatHoldsTheEnds) {
   std::string text = kColumn + R"([[displace]]
 set = "top"
-[[displace.key]]
-time_s = 0
-displacement_mm = [0, 0, 0]
+key = [{time_s = 0, displacement_mm = [0, 0, 0]}]
 [run]
 mode = "static"
 seconds = 1
@@ -299,9 +274,7 @@ TEST(ScenarioRun, ShorterStepsAreMoreStepsOfTheSameTime) {
   const auto text = [](const char* dt) {
     return kColumn + R"([[force]]
 set = "top"
-[[force.key]]
-time_s = 0
-force_n = [0, 0.4, 0]
+key = [{time_s = 0, force_n = [0, 0.4, 0]}]
 [[probe]]
 set = "top"
 quantity = "displacement"
@@ -326,12 +299,7 @@ TEST(ScenarioRun, AMovingColumnKeepsNewtonsLaw) {
 m_s2 = [0, -9.81, 0]
 [[displace]]
 set = "top"
-[[displace.key]]
-time_s = 0
-displacement_mm = [0, 0, 0]
-[[displace.key]]
-time_s = 0.05
-displacement_mm = [2, 5, 0]
+key = [{time_s = 0, displacement_mm = [0, 0, 0]}, {time_s = 0.05, displacement_mm = [2, 5, 0]}]
 [run]
 seconds = 0.1
 tolerance_n = 1e-6
@@ -370,12 +338,7 @@ name = "corner"
 nearest_mm = [20, 20, 20]
 [[force]]
 set = "corner"
-[[force.key]]
-time_s = 0
-force_n = [0, 0, 0]
-[[force.key]]
-time_s = 0.1
-force_n = [0.05, 0.1, 0]
+key = [{time_s = 0, force_n = [0, 0, 0]}, {time_s = 0.1, force_n = [0.05, 0.1, 0]}]
 [run]
 seconds = 0.2
 tolerance_n = 1e-6
@@ -416,14 +379,8 @@ spacing_mm = 10
 elastic_law = "neo-hookean"
 [[tool]]
 radius_mm = 15
-[[tool.key]]
-time_s = 0
-position_mm = [0, 25, 0]
-shaft = [0, 1, 0]
-verb = "push"
-[[tool.key]]
-time_s = 0.3
-position_mm = [0, 18, 0]
+key = [{time_s = 0, position_mm = [0, 25, 0], shaft = [0, 1, 0], verb = "push"},
+       {time_s = 0.3, position_mm = [0, 18, 0]}]
 [run]
 seconds = 1
 [[probe]]
@@ -450,9 +407,7 @@ box_min_mm = [-10, 55, -10]
 box_max_mm = [10, 55, 10]
 [[force]]
 set = "top"
-[[force.key]]
-time_s = 0
-force_n = [0, 0.1, 0]
+key = [{time_s = 0, force_n = [0, 0.1, 0]}]
 [run]
 seconds = 0.3
 depth = 2
@@ -484,12 +439,7 @@ TEST(ScenarioRun, TheSameScenarioTwiceWritesTheSameBytes) {
 m_s2 = [0, -9.81, 0]
 [[displace]]
 set = "top"
-[[displace.key]]
-time_s = 0
-displacement_mm = [0, 0, 0]
-[[displace.key]]
-time_s = 0.1
-displacement_mm = [1, 2, 3]
+key = [{time_s = 0, displacement_mm = [0, 0, 0]}, {time_s = 0.1, displacement_mm = [1, 2, 3]}]
 [run]
 seconds = 0.2
 [[probe]]
@@ -542,18 +492,9 @@ elastic_law = "neo-hookean"
 [[tool]]
 radius_mm = 1
 edge_mm = 30
-[[tool.key]]
-time_s = 0
-position_mm = [-30, -12, -3]
-shaft = [0, 1, 0]
-verb = "cut"
-[[tool.key]]
-time_s = 0.2
-position_mm = [8, -12, 7]
-[[tool.key]]
-time_s = 0.21
-position_mm = [8, -12, 7]
-verb = "none"
+key = [{time_s = 0, position_mm = [-30, -12, -3], shaft = [0, 1, 0], verb = "cut"},
+       {time_s = 0.2, position_mm = [8, -12, 7]},
+       {time_s = 0.21, position_mm = [8, -12, 7], verb = "none"}]
 [run]
 seconds = 0.25
 self_contact = false

@@ -17,9 +17,7 @@ box_min_mm = [-5, 20, -5]
 box_max_mm = [5, 20, 5]
 [[traction]]
 set = "top"
-[[traction.key]]
-time_s = 0
-traction_pa = [0, 40, 0]
+key = [{time_s = 0, traction_pa = [0, 40, 0]}]
 [[probe]]
 set = "top"
 quantity = "displacement"
@@ -58,17 +56,8 @@ young_modulus_pa = 4000
 reach_mm = 8
 grip_n = 50
 anchor = [0, 1, 0]
-[[tool.key]]
-time_s = 0
-position_mm = [0, 0, 0]
-shaft = [0, 1, 0]
-verb = "grasp"
-[[tool.key]]
-time_s = 0.5
-position_mm = [0, 0, 0]
-[[tool.key]]
-time_s = 1
-position_mm = [0, 2, 0]
+key = [{time_s = 0, position_mm = [0, 0, 0], shaft = [0, 1, 0], verb = "grasp"},
+       {time_s = 0.5, position_mm = [0, 0, 0]}, {time_s = 1, position_mm = [0, 2, 0]}]
 [run]
 mode = "static"
 seconds = 1
@@ -143,9 +132,7 @@ axes = "z"
 [[displace]]
 set = "top"
 axes = "y"
-[[displace.key]]
-time_s = 0
-displacement_mm = [0, 1, 0]
+key = [{time_s = 0, displacement_mm = [0, 1, 0]}]
 [[probe]]
 set = "top"
 quantity = "reaction"
@@ -187,12 +174,12 @@ TEST(ScenarioRun, WhatTheSolverCannotDoIsRefusedWithItsLine) {
     return supported.ok() ? std::string("accepted") : supported.error().message;
   };
   EXPECT_EQ(refusal(pulled_block("", "integrator = \"explicit\"\n")),
-            "test.toml:18: key probe[1].set: a reaction needs integrator = \"implicit\" in [run]");
+            "test.toml:16: key probe[1].set: a reaction needs integrator = \"implicit\" in [run]");
   const auto refused =
       refusal(pulled_block("", "depth = 2\n") +
               "[[nodes]]\nname = \"side\"\nids = [40]\n[[displace]]\nset = \"side\"\naxes = "
               "\"x\"\n");
-  EXPECT_TRUE(refused.starts_with("test.toml:29: key displace[0].set: is held along some axes"))
+  EXPECT_TRUE(refused.starts_with("test.toml:27: key displace[0].set: is held along some axes"))
       << refused;
   EXPECT_EQ(refusal(pulled_block("", "")), "accepted");
 }
@@ -200,9 +187,7 @@ TEST(ScenarioRun, WhatTheSolverCannotDoIsRefusedWithItsLine) {
 std::string swinging(const std::string& run) {
   return kColumn + R"([[force]]
 set = "top"
-[[force.key]]
-time_s = 0
-force_n = [0, 0.4, 0]
+key = [{time_s = 0, force_n = [0, 0.4, 0]}]
 [[probe]]
 set = "top"
 quantity = "displacement"
@@ -235,12 +220,12 @@ TEST(ScenarioRun, AnUnstableExplicitStepIsRefusedWithTheOneToWrite) {
   };
   std::string text = message("integrator = \"explicit\"\ndt_s = 0.001\n");
   EXPECT_TRUE(
-      text.starts_with("test.toml:23: key run.dt_s: is 0.001, \"explicit\" is stable up to "))
+      text.starts_with("test.toml:21: key run.dt_s: is 0.001, \"explicit\" is stable up to "))
       << text;
   const auto advised = text.substr(text.rfind(' ') + 1);
   EXPECT_EQ(message("integrator = \"explicit\"\ndt_s = " + advised + "\n"), "");
   text = message("integrator = \"explicit\"\n");
-  EXPECT_TRUE(text.starts_with("test.toml:22: key run.integrator: is 0.001")) << text;
+  EXPECT_TRUE(text.starts_with("test.toml:20: key run.integrator: is 0.001")) << text;
 }
 
 TEST(ScenarioRun, ThreadsChangeNothing) {

@@ -209,14 +209,8 @@ elastic_law = "neo-hookean"
 [[tool]]
 radius_mm = 1
 edge_mm = 30
-[[tool.key]]
-time_s = 0
-position_mm = [-30, 2, 0]
-shaft = [0, 1, 0]
-verb = "cut"
-[[tool.key]]
-time_s = 0.2
-position_mm = [30, 2, 0]
+key = [{time_s = 0, position_mm = [-30, 2, 0], shaft = [0, 1, 0], verb = "cut"},
+       {time_s = 0.2, position_mm = [30, 2, 0]}]
 [[probe]]
 tool = 0
 quantity = "force"

@@ -47,10 +47,6 @@ TEST(TryLimiter, the_table_is_bounded_and_an_address_of_ipv6_counts_as_its_netwo
     limiter.record_wrong_try("10.1." + std::to_string(i / 250) + "." + std::to_string(i % 250),
                              static_cast<std::uint64_t>(i) * kSecond / 100);
   EXPECT_EQ(limiter.address_count(), TryLimiter::kMostAddresses);
-  EXPECT_EQ(counted_as("2001:db8:1:2::7"), counted_as("2001:db8:1:2:ffff::8%eth0"));
-  EXPECT_NE(counted_as("2001:db8:1:2::7"), counted_as("2001:db8:1:3::7"));
-  EXPECT_EQ(counted_as("::ffff:10.0.0.1"), "10.0.0.1");
-  EXPECT_EQ(counted_as("10.0.0.1"), "10.0.0.1");
 }
 
 }  // namespace

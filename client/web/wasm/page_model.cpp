@@ -189,7 +189,7 @@ void PageModel::update_tools() {
 void PageModel::update_overlay(Overlay overlay) {
   std::vector<tool::ToolShape> shapes;
   for (const auto& tool : shown_->tools()) {
-    const auto* owner = replica_->find_participant(tool.slot.owner());
+    const auto* owner = replica_->told().find_participant(tool.slot.owner());
     const auto number = static_cast<std::size_t>(tool.slot.number());
     shapes.push_back(owner != nullptr && number < owner->tools.size() ? owner->tools[number]
                                                                       : tool::ToolShape{});
@@ -236,7 +236,7 @@ void PageModel::update_drawing() {
 }
 
 const float* PageModel::lesson_target() {
-  const auto& lesson = replica_->lesson();
+  const auto& lesson = replica_->told().lesson();
   const auto* newest = replica_->newest();
   const auto target = lesson && newest != nullptr ? lesson->target_m(newest->tick) : std::nullopt;
   if (!target) return nullptr;
@@ -263,7 +263,7 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
   update_figures();
   update_tools();
   pointers_.clear();
-  for (const auto& pointer : replica_->pointers(to_ns(now_ms)))
+  for (const auto& pointer : replica_->told().pointers(to_ns(now_ms)))
     pointers_.push_back({static_cast<float>(pointer.participant.value), pointer.position_m});
   update_overlay(overlay);
   update_fine();

@@ -5,9 +5,9 @@
 #include <ctime>
 
 #include "common/base/printable.h"
+#include "common/http/ask.h"
 #include "server/app/hall/hall_bus.h"
 #include "server/hall/proof/proof.h"
-#include "server/session/monitoring/http_ask.h"
 
 namespace trocar::app {
 namespace {
@@ -27,15 +27,15 @@ Result<Json> read_answer(unsigned status, const std::string& body, const std::st
 
 Result<Json> HallClient::ask(const std::string& method, const std::string& path,
                              const std::string& body, std::chrono::seconds deadline) const {
-  const auto answer = monitoring::ask_and_wait({.host = host_,
-                                                .port = port_,
-                                                .method = method,
-                                                .path = path,
-                                                .body = body,
-                                                .key = key_,
-                                                .deadline = deadline,
-                                                .tls = tls_,
-                                                .certificate_der = certificate_der_});
+  const auto answer = http::ask_and_wait({.host = host_,
+                                          .port = port_,
+                                          .method = method,
+                                          .path = path,
+                                          .body = body,
+                                          .key = key_,
+                                          .deadline = deadline,
+                                          .tls = tls_,
+                                          .certificate_der = certificate_der_});
   const auto where = fmt::format("{}:{}", host_, port_);
   if (!answer && answer.error().code == ErrorCode::Refused)
     return Error{ErrorCode::Refused, where + ": " + answer.error().message +

@@ -26,7 +26,8 @@ class HallConnection {
 
 class HallClient final : public HallConnection {
  public:
-  // `key`: empty if there is none. `tls` null: without. `certificate_der`: as HttpQuestion has it.
+  // `key`: empty if there is none. `tls` null: without. `certificate_der`: as http::Question has
+  // it.
   HallClient(std::string host, std::uint16_t port, std::string key, secure::TlsContext tls,
              Bytes certificate_der)
       : host_(std::move(host)),

@@ -6,15 +6,13 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
-#include <cstdio>
 #include <functional>
 #include <memory>
 
-#include "common/base/json_log.h"
 #include "common/base/log.h"
-#include "common/base/program.h"
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
+#include "server/app/config/service.h"
 #include "server/app/hall/hall_bus.h"
 #include "server/app/hall/hall_commands.h"
 #include "server/app/hall/hall_server.h"
@@ -24,7 +22,6 @@
 namespace trocar::app {
 namespace {
 
-constexpr const char* kProgram = "trocar-hall";
 constexpr std::chrono::milliseconds kEndPoll{100};
 
 // All sessions end in order; the hall ends when their recordings are closed.
@@ -100,33 +97,15 @@ Status run_hall(const HallOptions& options) {
   return {};
 }
 
-int check_config(const HallOptions& options) {
-  if (const auto fine = check_hall_start(options); !fine)
-    return report(kProgram, {ErrorCode::Usage, fine.error().message});
-  std::printf("%s: fine\n", options.config_file.c_str());
-  return static_cast<int>(ExitCode::Ok);
-}
-
-int run(int argc, char** argv) {
-  const auto parsed = parse_hall_command_line(argc, argv);
-  if (!parsed) return report(kProgram, parsed.error());
-  if (!*parsed) return static_cast<int>(ExitCode::Ok);
-  const auto& options = **parsed;
-  if (const auto set = log::configure(kProgram, options.checks_config ? "off" : options.log_level);
-      !set)
-    return report(kProgram, set.error());
-  log::use_format(options.log_format);
-  if (options.checks_config) return check_config(options);
-  const auto ran =
-      options.command == HallCommand::Serve ? run_hall(options) : run_hall_command(options);
-  return ran ? static_cast<int>(ExitCode::Ok) : report(kProgram, ran.error());
+Status run(const HallOptions& options) {
+  return options.command == HallCommand::Serve ? run_hall(options) : run_hall_command(options);
 }
 
 }  // namespace
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::begin_program(trocar::app::kProgram);
-  trocar::ignore_broken_pipes();
-  return trocar::app::run(argc, argv);
+  using namespace trocar::app;
+  return run_service<HallOptions>({"trocar-hall", parse_hall_command_line, check_hall_start, run},
+                                  argc, argv);
 }

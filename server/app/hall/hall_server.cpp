@@ -15,46 +15,50 @@
 #include "common/base/printable.h"
 #include "common/base/spawn.h"
 #include "common/base/timing.h"
+#include "common/http/stream.h"
+#include "common/intake/acceptor.h"
 #include "common/secure/digest.h"
 #include "server/session/access/audit_log.h"
 #include "server/session/monitoring/exposition.h"
-#include "server/session/monitoring/http_acceptor.h"
-#include "server/session/monitoring/http_stream.h"
 
 namespace trocar::app {
 namespace {
-
-namespace http = boost::beast::http;
-using Request = monitoring::HttpRequest;
 
 constexpr std::chrono::milliseconds kEndPoll{100};
 constexpr std::uint64_t kWrongProofNoteNs = 1'000'000'000;
 constexpr std::string_view kBearer = "Bearer ";
 constexpr std::string_view kSessions = "/sessions", kOneSession = "/sessions/";
 
-enum class Trust : std::uint8_t { None, Wrong, Full };
+constexpr unsigned kOk = 200, kCreated = 201, kAccepted = 202, kBadRequest = 400,
+                   kUnauthorized = 401, kNotFound = 404, kMethodNotAllowed = 405, kConflict = 409,
+                   kTooLarge = 413, kUnavailable = 503;
 
-struct Reply {
-  http::status status = http::status::ok;
-  std::string body, type = "application/json";
-};
-
-Reply reply(const Json& json, http::status status = http::status::ok) {
-  return {.status = status, .body = to_text(json)};
+http::Answer answer_of(unsigned status, std::string type, std::string body) {
+  return {.status = status,
+          .fields = {{"Content-Type", std::move(type)},
+                     {"Cache-Control", "no-store"},
+                     {"X-Content-Type-Options", "nosniff"}},
+          .body = std::move(body)};
 }
 
-Reply refusal(http::status status, const std::string& why) {
-  return reply({{"error", why}}, status);
+http::Answer reply(const Json& json, unsigned status = kOk) {
+  return answer_of(status, "application/json", to_text(json));
 }
 
-http::status status_of(const Error& error) {
+http::Answer refusal(unsigned status, const std::string& why) {
+  auto answer = reply({{"error", why}}, status);
+  if (status == kUnauthorized) answer.fields.emplace_back("WWW-Authenticate", "Bearer");
+  return answer;
+}
+
+unsigned status_of(const Error& error) {
   switch (error.code) {
     case ErrorCode::BadMessage:
-      return http::status::bad_request;
+      return kBadRequest;
     case ErrorCode::Refused:
-      return http::status::conflict;
+      return kConflict;
     default:
-      return http::status::service_unavailable;
+      return kUnavailable;
   }
 }
 
@@ -99,20 +103,24 @@ std::string exposition(const hall::Sessions& sessions) {
 }  // namespace
 
 struct HallServer::Core {
+  enum class Trust : std::uint8_t { None, Wrong, Full };
+
+  asio::io_context& context;
   hall::Sessions& sessions;
   const secure::Digest key;
   const secure::TlsContext tls;
   access::AuditLog audit;
   std::uint64_t wrong_proof_ns = 0;  // when one was last noted
-  monitoring::HttpAcceptor acceptor;
+  intake::Acceptor acceptor;
 
-  Core(asio::io_context& context, hall::Sessions& all, const std::string& secret,
+  Core(asio::io_context& io, hall::Sessions& all, const std::string& secret,
        secure::TlsContext with, access::AuditLog log)
-      : sessions(all),
+      : context(io),
+        sessions(all),
         key(digest_of(secret)),
         tls(std::move(with)),
         audit(std::move(log)),
-        acceptor(context, kMostConnections) {}
+        acceptor(io, {.most = kMostConnections, .time_to_speak = kRequestDeadline}) {}
 
   // `what`: start, end or refusal.
   void note(const std::string& what, const std::string& name, const std::string& peer,
@@ -120,74 +128,58 @@ struct HallServer::Core {
     audit.write({.event = what, .name = name, .role = "", .address = peer, .reason = reason});
   }
 
-  asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
-    boost::system::error_code unknown;
-    const auto peer = socket.remote_endpoint(unknown).address().to_string();
-    monitoring::HttpStream stream(std::move(socket), tls);
-    stream.end_after(kRequestDeadline);
-    std::optional<monitoring::HttpAcceptor::Newcomer> newcomer(
-        std::in_place, acceptor, peer, [&stream] { stream.end_after(kRequestDeadline.zero()); });
+  asio::awaitable<void> serve(asio::ip::tcp::socket socket,
+                              std::unique_ptr<intake::Acceptor::Peer> peer) {
+    http::Stream stream(std::move(socket), tls);
+    peer->set_cut([&stream](auto) { stream.cut(); });
     if (tls)
       if (const auto failed = co_await stream.below().accept_tls()) co_return;
-    http::request_parser<http::string_body> parser;
-    parser.header_limit(kMostHeadBytes);
-    parser.body_limit(hall::kMostRequestBytes);
-    stream.end_after(kRequestDeadline);
-    const auto failed = co_await stream.read(parser);
-    newcomer.reset();
-    stream.end_never();
-    Reply given;
-    if (failed == http::error::body_limit)
-      given = refusal(http::status::payload_too_large, "the request is longer than 4096 bytes");
-    else if (failed)
+    http::Request request;
+    const http::MessageLimits limits{kMostHeadBytes, hall::kMostRequestBytes};
+    const auto read = co_await stream.read(request, limits);
+    peer->speak();
+    http::Answer answer;
+    if (read == http::Reading::TooLong)
+      answer = refusal(kTooLarge, "the request is longer than 4096 bytes");
+    else if (read != http::Reading::Whole)
       co_return;
     else
-      given = co_await answer_to(parser.get(), peer);
-    monitoring::HttpResponse answer(given.status, parser.get().version());
-    answer.keep_alive(false);
-    answer.set(http::field::content_type, given.type);
-    answer.set(http::field::cache_control, "no-store");
-    answer.set("X-Content-Type-Options", "nosniff");
-    if (given.status == http::status::unauthorized)
-      answer.set(http::field::www_authenticate, "Bearer");
-    answer.body() = std::move(given.body);
-    answer.prepare_payload();
+      answer = co_await answer_to(request, peer->address());
+    request.keeps_alive = false;
     stream.end_after(kRequestDeadline);
-    const auto unsent = co_await stream.write(answer);
-    if (!unsent) stream.shut_down();
+    const bool is_sent = co_await stream.write(request, answer);
+    if (is_sent) stream.shut_down();
   }
 
-  Trust trust_in(const Request& request) const {
-    const auto given = request[http::field::authorization];
+  Trust trust_in(const http::Request& request) const {
+    const auto given = request.field("Authorization");
     if (given.empty()) return Trust::None;
     if (!given.starts_with(kBearer)) return Trust::Wrong;
-    const auto told = given.substr(kBearer.size());
-    const bool is_key = secure::equal_in_constant_time(digest_of({told.data(), told.size()}), key);
+    const bool is_key =
+        secure::equal_in_constant_time(digest_of(given.substr(kBearer.size())), key);
     return is_key ? Trust::Full : Trust::Wrong;
   }
 
-  asio::awaitable<Reply> answer_to(const Request& request, const std::string& peer) {
+  asio::awaitable<http::Answer> answer_to(const http::Request& request, const std::string& peer) {
     const auto trust = trust_in(request);
     if (trust == Trust::Wrong) {
       note("refusal", "", peer, "the key is wrong");
-      asio::steady_timer delay(acceptor.context(), kWrongKeyDelay);
+      asio::steady_timer delay(context, kWrongKeyDelay);
       co_await delay.async_wait(kNoThrow);
-      co_return refusal(http::status::unauthorized, "the key is wrong: name the hall's file of it");
+      co_return refusal(kUnauthorized, "the key is wrong: name the hall's file of it");
     }
-    const std::string path(request.target().data(), request.target().size());
-    co_return co_await route(request.method(), path, request.body(), trust, peer);
+    co_return co_await route(request.method, request.target, request.body, trust, peer);
   }
 
-  asio::awaitable<Reply> route(http::verb method, std::string path, std::string body, Trust trust,
-                               std::string peer) {
-    if (method == http::verb::get) co_return get(path, trust == Trust::Full);
-    const bool is_start = method == http::verb::post && path == kSessions;
-    const bool is_end = method == http::verb::delete_ && path.starts_with(kOneSession);
+  asio::awaitable<http::Answer> route(std::string method, std::string path, std::string body,
+                                      Trust trust, std::string peer) {
+    if (method == "GET") co_return get(path, trust == Trust::Full);
+    const bool is_start = method == "POST" && path == kSessions;
+    const bool is_end = method == "DELETE" && path.starts_with(kOneSession);
     if (!is_start && !is_end)
-      co_return refusal(http::status::method_not_allowed,
+      co_return refusal(kMethodNotAllowed,
                         "there are GET and POST of /sessions, GET and DELETE of /sessions/NAME");
-    if (trust != Trust::Full)
-      co_return refusal(http::status::unauthorized, "this needs the hall's key");
+    if (trust != Trust::Full) co_return refusal(kUnauthorized, "this needs the hall's key");
     if (is_start) co_return start(body, peer);
     co_return co_await end(path.substr(kOneSession.size()), peer);
   }
@@ -208,7 +200,7 @@ struct HallServer::Core {
   // Answers one request that came over a bus.
   asio::awaitable<void> answer_bus(hall::BusRequest request, hall::Proof proof,
                                    std::function<void(const std::string&)> answer) {
-    Reply given;
+    http::Answer given;
     if (proof == hall::Proof::Wrong) {
       const auto now = monotonic_ns();
       if (wrong_proof_ns == 0 || now - wrong_proof_ns >= kWrongProofNoteNs) {
@@ -216,35 +208,34 @@ struct HallServer::Core {
         note("refusal", "", "bus", "the proof is wrong");
       }
       given =
-          refusal(http::status::unauthorized,
+          refusal(kUnauthorized,
                   "the key is wrong, the clocks of both machines differ by a minute, or the hall "
                   "has only just started");
     } else if (request.body.size() > hall::kMostRequestBytes) {
-      given = refusal(http::status::payload_too_large, "the request is longer than 4096 bytes");
+      given = refusal(kTooLarge, "the request is longer than 4096 bytes");
     } else {
       const auto trust = proof == hall::Proof::Right ? Trust::Full : Trust::None;
-      given = co_await route(http::string_to_verb(request.method), request.path, request.body,
-                             trust, "bus");
+      given = co_await route(request.method, request.path, request.body, trust, "bus");
     }
-    answer(Json{{"status", static_cast<int>(given.status)}, {"body", given.body}}.dump(
+    answer(Json{{"status", given.status}, {"body", given.body}}.dump(
         -1, ' ', false, Json::error_handler_t::replace));
   }
 
-  Reply get(const std::string& path, bool is_trusted) const {
-    if (path == "/healthz") return {.body = "ok\n", .type = "text/plain; charset=utf-8"};
+  http::Answer get(const std::string& path, bool is_trusted) const {
+    if (path == "/healthz") return answer_of(kOk, "text/plain; charset=utf-8", "ok\n");
     if (path == "/metrics")
-      return {.body = exposition(sessions), .type = monitoring::kExpositionType};
+      return answer_of(kOk, monitoring::kExpositionType, exposition(sessions));
     const auto& config = sessions.config();
     if (path == kSessions) return reply(directory(is_trusted));
     if (path.starts_with(kOneSession))
       if (const auto session = sessions.find(path.substr(kOneSession.size())))
         return reply(hall::describe(*session, config, is_trusted));
-    return refusal(http::status::not_found, "there is no " + printable(path, 64) +
-                                                ": ask for /sessions, /healthz or /metrics");
+    return refusal(kNotFound, "there is no " + printable(path, 64) +
+                                  ": ask for /sessions, /healthz or /metrics");
   }
 
-  Reply start(const std::string& body, const std::string& peer) {
-    if (acceptor.is_stopping()) return refusal(http::status::service_unavailable, "the hall ends");
+  http::Answer start(const std::string& body, const std::string& peer) {
+    if (acceptor.is_stopping()) return refusal(kUnavailable, "the hall ends");
     const auto request = hall::parse_start_request(body);
     if (!request) return refusal(status_of(request.error()), request.error().message);
     const auto started = sessions.start(*request);
@@ -253,24 +244,23 @@ struct HallServer::Core {
       return refusal(status_of(started.error()), started.error().message);
     }
     note("start", (*started)->name, peer);
-    return reply(hall::describe(**started, sessions.config(), true), http::status::created);
+    return reply(hall::describe(**started, sessions.config(), true), kCreated);
   }
 
-  asio::awaitable<Reply> end(std::string name, std::string peer) {
+  asio::awaitable<http::Answer> end(std::string name, std::string peer) {
     const auto ended = sessions.end(name);
-    if (!ended) co_return refusal(http::status::not_found, ended.error().message);
+    if (!ended) co_return refusal(kNotFound, ended.error().message);
     note("end", name, peer);
     const auto session = *ended;
     const auto deadline = std::chrono::steady_clock::now() + kEndDeadline;
-    asio::steady_timer timer(acceptor.context());
+    asio::steady_timer timer(context);
     while (session->state != hall::SessionState::Ended &&
            std::chrono::steady_clock::now() < deadline) {
       timer.expires_after(kEndPoll);
       co_await timer.async_wait(kNoThrow);
     }
     const bool has_ended = session->state == hall::SessionState::Ended;
-    co_return reply(hall::describe(*session, sessions.config(), true),
-                    has_ended ? http::status::ok : http::status::accepted);
+    co_return reply(hall::describe(*session, sessions.config(), true), has_ended ? kOk : kAccepted);
   }
 };
 
@@ -285,8 +275,7 @@ Result<std::unique_ptr<HallServer>> HallServer::listen(asio::io_context& context
   if (const auto opened = core->acceptor.open(config.address, config.port, "listen"); !opened)
     return opened.error();
   core->acceptor.start(
-      [at = core.get()](asio::ip::tcp::socket socket) { return at->serve(std::move(socket)); },
-      core);
+      [core](auto socket, auto peer) { return core->serve(std::move(socket), std::move(peer)); });
   return std::unique_ptr<HallServer>(new HallServer(core));
 }
 
@@ -302,8 +291,7 @@ std::uint16_t HallServer::port() const {
 
 void HallServer::answer(const hall::BusRequest& request, hall::Proof proof,
                         std::function<void(const std::string&)> answer) {
-  spawn(core_->acceptor.context().get_executor(),
-        core_->answer_bus(request, proof, std::move(answer)),
+  spawn(core_->context.get_executor(), core_->answer_bus(request, proof, std::move(answer)),
         [core = core_](std::exception_ptr failure) { rethrow(failure); });
 }
 

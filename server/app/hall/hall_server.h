@@ -12,7 +12,7 @@
 // What changes something needs "Authorization: Bearer KEY". Errors are {"error": "one line"}.
 //
 // Bounds: kMostConnections at a time, one request each, kMostHeadBytes and kMostRequestBytes of it
-// within kRequestDeadline, with TLS after as long for the handshake. A wrong key is answered after
+// within kRequestDeadline, with TLS the handshake, too. A wrong key is answered after
 // kWrongKeyDelay.
 //
 // Thread: the one that runs the I/O context.
@@ -35,8 +35,8 @@ namespace trocar::app {
 
 class HallServer {
  public:
-  static constexpr std::size_t kMostConnections = 32;
-  static constexpr std::size_t kMostHeadBytes = 8192;
+  static constexpr int kMostConnections = 32;
+  static constexpr std::uint32_t kMostHeadBytes = 8192;
   static constexpr std::chrono::seconds kRequestDeadline{5};
   static constexpr std::chrono::seconds kWrongKeyDelay{1};
   static constexpr std::chrono::seconds kEndDeadline{90};

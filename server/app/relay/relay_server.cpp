@@ -17,6 +17,7 @@
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "common/base/writable.h"
+#include "common/intake/acceptor.h"
 #include "common/secure/certificate.h"
 #include "common/secure/kept_identity.h"
 #include "common/secure/link_file.h"
@@ -287,9 +288,9 @@ Status RelayServer::run() {
 }  // namespace
 
 Status check_relay(const RelayOptions& options) {
-  if (const auto fine = net::check_listen_address(options.address); !fine) return fine;
+  if (const auto fine = intake::check_address(options.address, "--listen"); !fine) return fine;
   if (!options.metrics_address.empty())
-    if (const auto fine = monitoring::check_figures_address(options.metrics_address); !fine)
+    if (const auto fine = intake::check_address(options.metrics_address, "--metrics"); !fine)
       return fine;
   if (const auto fine = check_certificate(options); !fine) return fine;
   if (!options.nats.url.empty())

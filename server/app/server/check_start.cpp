@@ -5,12 +5,11 @@
 
 #include "common/base/kept_file.h"
 #include "common/base/writable.h"
+#include "common/intake/acceptor.h"
 #include "common/journal/session_journal.h"
 #include "server/app/server/admission.h"
 #include "server/app/server/session_start.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/session/monitoring/figures_server.h"
-#include "server/session/net/tcp_server.h"
 
 namespace trocar::app {
 namespace {
@@ -62,9 +61,9 @@ Status check_start(const ServerOptions& options) {
     return of("revoke", Error{ErrorCode::Usage, "starts no session that could be checked"});
   if (!access.new_code.empty())
     return of("new-code", Error{ErrorCode::Usage, "starts no session that could be checked"});
-  if (const auto s = net::check_listen_address(options.address); !s) return of("listen", s);
+  if (const auto s = intake::check_address(options.address, "--listen"); !s) return of("listen", s);
   if (!options.metrics_address.empty())
-    if (const auto s = monitoring::check_figures_address(options.metrics_address); !s)
+    if (const auto s = intake::check_address(options.metrics_address, "--metrics"); !s)
       return of("metrics", s);
   const char* identity = access.certificate_file.empty() ? "state" : "certificate";
   if (const auto s = Admission::check(access, options.address); !s) return of(identity, s);

@@ -15,8 +15,8 @@ struct LimitOptions {
   std::uint32_t messages_per_second = 2000;  // of one client
   std::uint32_t kilobytes_per_second = 500;  // likewise
   std::uint32_t message_bytes = wire::kMaxUpstreamBytes;
-  std::size_t newcomers = 48;  // connections that have not said who they are
-  std::size_t newcomers_per_address = 32;
+  int newcomers = 48;  // connections that have not said who they are
+  int newcomers_per_address = 32;
 };
 
 }  // namespace trocar::app

@@ -162,8 +162,7 @@ Status Server::open() {
   tcp.max_newcomers = limits.newcomers;
   tcp.max_newcomers_per_address = limits.newcomers_per_address;
   tcp.max_message_bytes = limits.message_bytes;
-  tcp.max_connections =
-      static_cast<std::size_t>(limits.places.hands + limits.places.watchers) + limits.newcomers;
+  tcp.max_connections = limits.places.hands + limits.places.watchers + limits.newcomers;
   tcp.plain_reply = replication::encode_goodbye(
       replication::EndReason::Version,
       "this server speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");

@@ -8,6 +8,7 @@
 #include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/session/recording/resume.h"
+#include "server/session/replication/lesson_messages.h"
 
 namespace trocar::app {
 namespace {
@@ -30,27 +31,13 @@ Result<organ::Organ> read_organ(const ServerOptions& options) {
   return organ;
 }
 
-// A session bleeds if its lesson does, or if it is asked to; vessels are the lesson's.
-std::optional<bleeding::Rules> bleeding_rules(const ServerOptions& options) {
-  if (!options.bleeds && !(options.lesson && options.lesson->bleeds)) return {};
-  bleeding::Rules rules;
-  if (!options.lesson) return rules;
-  for (const auto& structure : options.lesson->structures)
-    if (structure.vessel_pressure_pa > 0)
-      rules.vessels.push_back({.name = structure.name,
-                               .from_m = structure.from_m,
-                               .to_m = structure.to_m,
-                               .radius_m = structure.radius_m,
-                               .pressure_pa = structure.vessel_pressure_pa,
-                               .most_flow_m3_s = structure.vessel_flow_m3_s});
-  return rules;
-}
-
 Result<SessionStart> begin(const ServerOptions& options) {
   auto organ = read_organ(options);
   if (!organ) return organ.error();
-  return SessionStart{.simulation = step::Simulation(std::move(*organ), most_workers(options),
-                                                     {.bleeding = bleeding_rules(options)})};
+  const auto* lesson = options.lesson ? &*options.lesson : nullptr;
+  return SessionStart{.simulation = step::Simulation(
+                          std::move(*organ), most_workers(options),
+                          {.bleeding = replication::bleeding_rules(lesson, options.bleeds)})};
 }
 
 // Somebody who names an organ means that one.

@@ -8,17 +8,14 @@
 #include <cmath>
 #include <cstdio>
 
-#include "common/base/json_log.h"
 #include "common/base/log.h"
-#include "common/base/program.h"
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
+#include "server/app/config/service.h"
 #include "server/app/web/web_start.h"
 
 namespace trocar::app {
 namespace {
-
-constexpr const char* kProgram = "trocar-web";
 
 // Everybody is cut; a second later the program ends whatever is still there.
 void end_in_order(asio::io_context& context, WebServer& server, asio::steady_timer& timer) {
@@ -68,33 +65,11 @@ Status run_web(const WebOptions& options) {
   return {};
 }
 
-int check_config(const WebOptions& options) {
-  if (const auto fine = check_web_start(options); !fine)
-    return report(kProgram, {ErrorCode::Usage, options.origins.placed(fine.error().message)});
-  std::printf("%s: fine\n", options.config_file.c_str());
-  return static_cast<int>(ExitCode::Ok);
-}
-
-int run(int argc, char** argv) {
-  const auto parsed = parse_web_command_line(argc, argv);
-  if (!parsed) return report(kProgram, parsed.error());
-  if (!*parsed) return static_cast<int>(ExitCode::Ok);
-  const auto& options = **parsed;
-  if (const auto set = log::configure(kProgram, options.checks_config ? "off" : options.log_level);
-      !set)
-    return report(kProgram, set.error());
-  log::use_format(options.log_format);
-  if (options.checks_config) return check_config(options);
-  if (const auto ran = run_web(options); !ran)
-    return report(kProgram, {ran.error().code, options.origins.placed(ran.error().message)});
-  return static_cast<int>(ExitCode::Ok);
-}
-
 }  // namespace
 }  // namespace trocar::app
 
 int main(int argc, char** argv) {
-  trocar::begin_program(trocar::app::kProgram);
-  trocar::ignore_broken_pipes();
-  return trocar::app::run(argc, argv);
+  using namespace trocar::app;
+  return run_service<WebOptions>({"trocar-web", parse_web_command_line, check_web_start, run_web},
+                                 argc, argv);
 }

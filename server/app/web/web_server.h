@@ -25,7 +25,6 @@
 namespace trocar::app {
 
 struct WebCounters {
-  std::uint64_t connections = 0, refused_full = 0;
   std::uint64_t requests = 0, not_found = 0, forbidden = 0, malformed = 0;
   std::uint64_t recording_bytes = 0;
 };

@@ -10,12 +10,12 @@
 #include "common/base/own_folder.h"
 #include "common/base/printable.h"
 #include "common/base/writable.h"
+#include "common/intake/acceptor.h"
 #include "common/secure/digest.h"
 #include "common/secure/kept_identity.h"
 #include "common/secure/link_file.h"
 #include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
-#include "server/session/monitoring/http_acceptor.h"
 
 namespace trocar::app {
 namespace {
@@ -135,7 +135,7 @@ Status check_web_start(const WebOptions& options) {
   for (const auto& [option, address] :
        {std::pair{"--listen", &options.address}, {"--metrics", &options.metrics_address}})
     if (!address->empty())
-      if (const auto fine = monitoring::check_address(*address, option); !fine) return fine;
+      if (const auto fine = intake::check_address(*address, option); !fine) return fine;
   if (!options.ready_file.empty())
     if (const auto ready = check_writable(options.ready_file); !ready)
       return Error{ready.error().code, "--ready-file: " + ready.error().message};

@@ -1,10 +1,8 @@
 #include "server/session/access/try_limiter.h"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
-#include <array>
-#include <cstring>
+
+#include "common/intake/room.h"
 
 namespace trocar::access {
 namespace {
@@ -13,19 +11,8 @@ constexpr int kMostDoublings = 6;  // 2^6 s is above the longest wait
 
 }  // namespace
 
-std::string counted_as(const std::string& address) {
-  in6_addr parsed{};
-  const auto text = address.substr(0, address.find('%'));
-  if (::inet_pton(AF_INET6, text.c_str(), &parsed) != 1) return address;
-  std::array<char, INET6_ADDRSTRLEN> out{};
-  if (IN6_IS_ADDR_V4MAPPED(&parsed))
-    return ::inet_ntop(AF_INET, parsed.s6_addr + 12, out.data(), out.size());
-  std::memset(parsed.s6_addr + 8, 0, 8);
-  return std::string(::inet_ntop(AF_INET6, &parsed, out.data(), out.size())) + "/64";
-}
-
 std::uint64_t TryLimiter::seconds_to_wait(const std::string& address, std::uint64_t now_ns) {
-  const auto found = addresses_.find(counted_as(address));
+  const auto found = addresses_.find(intake::counted_as(address));
   if (found != addresses_.end() && now_ns < found->second.allowed_ns)
     return (found->second.allowed_ns - now_ns + kSecondNs - 1) / kSecondNs;
   const bool is_same_second = now_ns - second_begin_ns_ < kSecondNs;
@@ -39,7 +26,7 @@ void TryLimiter::record_wrong_try(const std::string& address, std::uint64_t now_
   }
   ++wrong_in_second_;
   forget_old(now_ns);
-  auto& record = addresses_[counted_as(address)];
+  auto& record = addresses_[intake::counted_as(address)];
   ++record.wrong_tries;
   record.last_ns = now_ns;
   if (record.wrong_tries < kFreeTries) return;

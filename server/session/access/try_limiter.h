@@ -7,7 +7,7 @@
 //                 without a wrong try make good for all.
 //   in all        20 wrong tries in a second; then everybody waits for the next second.
 //
-// An IPv6 address counts as its /64, which is what one household has. At most 1024 addresses are
+// An IPv6 address counts as its /64 (counted_as()). At most 1024 addresses are
 // kept; the one that has been quiet longest makes room.
 
 #include <cstdint>
@@ -45,9 +45,5 @@ class TryLimiter {
   std::uint64_t second_begin_ns_ = 0;
   int wrong_in_second_ = 0;
 };
-
-// "2001:db8:1:2::/64" for "2001:db8:1:2::7", other addresses as they are; an IPv4 address that is
-// written as IPv6 counts as IPv4.
-std::string counted_as(const std::string& address);
 
 }  // namespace trocar::access

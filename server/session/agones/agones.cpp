@@ -13,18 +13,18 @@
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
 #include "common/base/spawn.h"
-#include "server/session/monitoring/http_ask.h"
+#include "common/http/ask.h"
 
 namespace trocar::agones {
 namespace {
 
 constexpr unsigned kOk = 200;
 
-monitoring::HttpQuestion question(std::uint16_t port, const char* method, const char* path) {
+http::Question question(std::uint16_t port, const char* method, const char* path) {
   return {.host = "127.0.0.1", .port = port, .method = method, .path = path, .body = "{}"};
 }
 
-Status taken(const Result<monitoring::HttpAnswer>& answer) {
+Status taken(const Result<http::Answer>& answer) {
   if (!answer) return answer.error();
   if (answer->status == kOk) return {};
   return Error{ErrorCode::Refused, fmt::format("it answers {}", answer->status)};
@@ -106,13 +106,13 @@ struct Sidecar::Core {
   static asio::awaitable<void> become_ready(std::shared_ptr<Core> core) {
     while (!core->is_stopping && !core->is_ready) {
       if (core->not_ready().empty()) {
-        const auto answer = co_await monitoring::ask(question(core->port, "POST", "/ready"));
+        const auto answer = co_await http::ask(question(core->port, "POST", "/ready"));
         core->is_ready = core->note("/ready", taken(answer));
       }
       if (!core->is_ready) co_await wait(core->ready_timer, kRetry);
     }
     if (core->is_stopping) co_return;
-    const auto answer = co_await monitoring::ask(question(core->port, "GET", "/gameserver"));
+    const auto answer = co_await http::ask(question(core->port, "GET", "/gameserver"));
     if (!answer) co_return;
     if (const auto place = read_place(answer->body); !place)
       log::warn("{}", place.error().message);
@@ -123,12 +123,12 @@ struct Sidecar::Core {
   static asio::awaitable<void> stay_healthy(std::shared_ptr<Core> core) {
     while (!core->is_stopping) {
       if (core->ill().empty()) {
-        const auto answer = co_await monitoring::ask(question(core->port, "POST", "/health"));
+        const auto answer = co_await http::ask(question(core->port, "POST", "/health"));
         core->note("/health", taken(answer));
       }
       if (core->is_stopping) co_return;
       if (core->has_people && core->is_ready && !core->is_allocated) {
-        const auto answer = co_await monitoring::ask(question(core->port, "POST", "/allocate"));
+        const auto answer = co_await http::ask(question(core->port, "POST", "/allocate"));
         core->is_allocated = core->note("/allocate", taken(answer));
       }
       if (!core->is_stopping) co_await wait(core->health_timer, kHealthPeriod);
@@ -158,7 +158,7 @@ void Sidecar::set_people(std::size_t count) {
 }
 
 Status shut_down(std::uint16_t port) {
-  const auto said = taken(monitoring::ask_and_wait(question(port, "POST", "/shutdown")));
+  const auto said = taken(http::ask_and_wait(question(port, "POST", "/shutdown")));
   if (said) return {};
   return Error{said.error().code, "Agones: /shutdown was not taken: " + said.error().message};
 }

@@ -1,86 +1,66 @@
 #include "server/session/monitoring/figures_server.h"
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/beast/http/empty_body.hpp>
-#include <optional>
 #include <utility>
 
+#include "common/http/stream.h"
+#include "common/intake/acceptor.h"
 #include "server/session/monitoring/exposition.h"
-#include "server/session/monitoring/http_acceptor.h"
-#include "server/session/monitoring/http_stream.h"
 
 namespace trocar::monitoring {
-namespace {
-
-namespace http = boost::beast::http;
-using Request = http::request<http::empty_body>;
-
-}  // namespace
 
 struct FiguresServer::Core {
   const FiguresAnswers answers;
-  HttpAcceptor acceptor;
+  intake::Acceptor acceptor;
 
   Core(asio::io_context& context, FiguresAnswers given)
-      : answers(std::move(given)), acceptor(context, kMostConnections) {}
+      : answers(std::move(given)),
+        acceptor(context, {.most = kMostConnections, .time_to_speak = kDeadline}) {}
 
-  asio::awaitable<void> serve(asio::ip::tcp::socket socket) {
-    boost::system::error_code unknown;
-    const auto peer = socket.remote_endpoint(unknown).address().to_string();
-    HttpStream stream(std::move(socket), nullptr);
+  asio::awaitable<void> serve(asio::ip::tcp::socket socket,
+                              std::unique_ptr<intake::Acceptor::Peer> peer) {
+    http::Stream stream(std::move(socket), nullptr);
+    peer->set_cut([&stream](auto) { stream.cut(); });
+    http::Request request;
+    const http::MessageLimits limits{.head_bytes = kMostHeaderBytes};
+    const auto read = co_await stream.read(request, limits);
+    peer->speak();
+    if (read != http::Reading::Whole || acceptor.is_stopping()) co_return;
+    request.keeps_alive = false;
+    const auto answer = answer_to(request);
     stream.end_after(kDeadline);
-    std::optional<HttpAcceptor::Newcomer> newcomer(
-        std::in_place, acceptor, peer, [&stream] { stream.end_after(kDeadline.zero()); });
-    http::request_parser<http::empty_body> parser;
-    parser.header_limit(kMostHeaderBytes);
-    const auto failed = co_await stream.read(parser, true);
-    newcomer.reset();
-    if (failed || acceptor.is_stopping()) co_return;
-    const auto answer = answer_to(parser.get());
-    const auto unsent = co_await stream.write(answer);
-    if (!unsent) stream.shut_down();
+    const bool is_sent = co_await stream.write(request, answer);
+    if (is_sent) stream.shut_down();
   }
 
-  HttpResponse answer_to(const Request& request) const {
-    HttpResponse answer;
-    answer.version(request.version());
-    answer.keep_alive(false);
-    answer.set(http::field::content_type, "text/plain; charset=utf-8");
-    answer.set(http::field::cache_control, "no-store");
-    answer.set("X-Content-Type-Options", "nosniff");
-    fill(request, answer);
-    answer.prepare_payload();
+  http::Answer answer_to(const http::Request& request) const {
+    http::Answer answer{.fields = {{"Content-Type", "text/plain; charset=utf-8"},
+                                   {"Cache-Control", "no-store"},
+                                   {"X-Content-Type-Options", "nosniff"}}};
+    const auto path = request.path();
+    if (request.method != "GET") {
+      answer.status = 405;
+      answer.fields.emplace_back("Allow", "GET");
+      answer.body = "Only GET.\n";
+    } else if (path == "/healthz") {
+      say(answer, answers.ill());
+    } else if (path == "/readyz") {
+      say(answer, answers.not_ready());
+    } else if (path == "/metrics") {
+      answer.fields.front().second = kExpositionType;
+      answer.body = answers.metrics();
+    } else {
+      answer.status = 404;
+      answer.body = "There are /healthz, /readyz and /metrics.\n";
+    }
     return answer;
   }
 
-  void fill(const Request& request, HttpResponse& answer) const {
-    if (request.method() != http::verb::get) {
-      answer.result(http::status::method_not_allowed);
-      answer.set(http::field::allow, "GET");
-      answer.body() = "Only GET.\n";
-      return;
-    }
-    const auto path = request.target().substr(0, request.target().find('?'));
-    if (path == "/healthz") return say(answer, answers.ill());
-    if (path == "/readyz") return say(answer, answers.not_ready());
-    if (path == "/metrics") {
-      answer.set(http::field::content_type, kExpositionType);
-      answer.body() = answers.metrics();
-      return;
-    }
-    answer.result(http::status::not_found);
-    answer.body() = "There are /healthz, /readyz and /metrics.\n";
-  }
-
-  static void say(HttpResponse& answer, const std::string& trouble) {
-    if (!trouble.empty()) answer.result(http::status::service_unavailable);
-    answer.body() = (trouble.empty() ? "ok" : trouble) + "\n";
+  static void say(http::Answer& answer, const std::string& trouble) {
+    if (!trouble.empty()) answer.status = 503;
+    answer.body = (trouble.empty() ? "ok" : trouble) + "\n";
   }
 };
-
-Status check_figures_address(const std::string& address) {
-  return check_address(address, "--metrics");
-}
 
 Result<std::unique_ptr<FiguresServer>> FiguresServer::listen(asio::io_context& context,
                                                              const std::string& address,
@@ -90,8 +70,7 @@ Result<std::unique_ptr<FiguresServer>> FiguresServer::listen(asio::io_context& c
   if (const auto opened = core->acceptor.open(address, port, "--metrics"); !opened)
     return opened.error();
   core->acceptor.start(
-      [at = core.get()](asio::ip::tcp::socket socket) { return at->serve(std::move(socket)); },
-      core);
+      [core](auto socket, auto peer) { return core->serve(std::move(socket), std::move(peer)); });
   return std::unique_ptr<FiguresServer>(new FiguresServer(core));
 }
 

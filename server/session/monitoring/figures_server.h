@@ -6,8 +6,8 @@
 //   GET /readyz    200 "ok", or 503 and one line: send nobody there now
 //   GET /metrics   figures for Prometheus
 //
-// Bounds: at most kMostConnections at a time, one request of each, kMostHeaderBytes of it, and
-// kDeadline for all. It knows no names and takes nothing.
+// Bounds: at most kMostConnections at a time, one request of each, kMostHeaderBytes of it,
+// kDeadline to ask and as long for the answer. It knows no names and takes nothing.
 //
 // Thread: the one that runs the I/O context; the answers are asked for there.
 
@@ -29,13 +29,10 @@ struct FiguresAnswers {
   std::function<std::string()> metrics;  // in the text exposition format
 };
 
-// Whether it is an IPv4 or IPv6 address; ErrorCode::Usage if not.
-Status check_figures_address(const std::string& address);
-
 class FiguresServer {
  public:
-  static constexpr std::size_t kMostConnections = 16;
-  static constexpr std::size_t kMostHeaderBytes = 4096;
+  static constexpr int kMostConnections = 16;
+  static constexpr std::uint32_t kMostHeaderBytes = 4096;
   static constexpr std::chrono::seconds kDeadline{5};
 
   // Binds and listens; ErrorCode::Usage for what is no address, ErrorCode::ResourceMissing when it

@@ -146,14 +146,10 @@ void Connection::fail(ConnectionFault fault) {
   if (state_ == State::Failed) close();
 }
 
-void Connection::check_deadlines(Clock::time_point now, Clock::duration hello,
-                                 Clock::duration idle) {
+void Connection::check_deadlines(Clock::time_point now, Clock::duration idle) {
   if (state_ == State::Draining && now >= drain_deadline_) return close();
-  const auto quiet = now - last_message_;
-  if (state_ == State::Greeting && quiet > hello) return close();
-  if (state_ != State::Open) return;
-  if (!first_message_seen_ && quiet > hello) return fail(ConnectionFault::HelloTimeout);
-  if (first_message_seen_ && quiet > idle) return fail(ConnectionFault::IdleTimeout);
+  if (state_ == State::Open && first_message_seen_ && now - last_message_ > idle)
+    fail(ConnectionFault::IdleTimeout);
 }
 
 bool Connection::deliver_frames() {

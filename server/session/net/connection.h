@@ -51,8 +51,6 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::size_t outstanding_bytes() const { return outstanding_; }
   const std::string& peer_address() const { return peer_address_; }
   std::optional<secure::DatagramKey> datagram_key() { return stream_.datagram_key(); }
-  // True until the first message is there, which shows that the peer means it.
-  bool is_newcomer() const { return !first_message_seen_; }
   // Its TLS is not there yet.
   bool is_greeting() const { return state_ == State::Greeting; }
   void close_after_flush(wire::SharedBytes last_words, Clock::time_point deadline);
@@ -61,7 +59,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void fail(ConnectionFault fault);
 
   // Checks time limits; called a few times per second.
-  void check_deadlines(Clock::time_point now, Clock::duration hello, Clock::duration idle);
+  void check_deadlines(Clock::time_point now, Clock::duration idle);
 
  private:
   enum class State { Greeting, Open, Failed, Draining, Closed };

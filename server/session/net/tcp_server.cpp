@@ -1,51 +1,42 @@
 #include "server/session/net/tcp_server.h"
 
-#include <algorithm>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <map>
-#include <set>
 #include <vector>
 
 #include "common/base/log.h"
 #include "common/base/spawn.h"
+#include "common/intake/acceptor.h"
 #include "server/session/net/connection.h"
 
 namespace trocar::net {
 namespace {
 
-using asio::ip::tcp;
 // Deadlines are seconds; nobody notices a quarter of one.
 constexpr std::chrono::milliseconds kSweepPeriod{100};
-// After a failed accept (no file descriptors left): wait instead of spinning.
-constexpr std::chrono::milliseconds kAcceptRetry{100};
+
+intake::Limits limits_of(const TcpServerOptions& options) {
+  return {.most = options.max_connections,
+          .most_silent = options.max_newcomers,
+          .most_silent_per_address = options.max_newcomers_per_address,
+          .time_to_speak = options.hello_deadline};
+}
 
 }  // namespace
 
 class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
  public:
   Core(asio::io_context& io, const TcpServerOptions& chosen)
-      : options(chosen), context(io), acceptor(io), sweep(io), retry(io) {}
+      : options(chosen), context(io), acceptor(io, limits_of(chosen)), sweep(io) {}
 
   Status open() {
-    if (const auto checked = check_listen_address(options.address); !checked) return checked;
-    boost::system::error_code error;
-    const tcp::endpoint endpoint(asio::ip::make_address(options.address, error), options.port);
-    acceptor.open(endpoint.protocol(), error);
-    if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
-    if (!error) acceptor.bind(endpoint, error);
-    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
-    if (error)
-      return Error{ErrorCode::ResourceMissing,
-                   "port " + std::to_string(options.port) + " at " + options.address +
-                       " cannot be used (" + error.message() +
-                       "): stop the program that has it or choose another with --listen"};
-    port = acceptor.local_endpoint(error).port();
+    if (auto opened = acceptor.open(options.address, options.port, "--listen"); !opened)
+      return opened;
     if (options.tls && options.has_datagrams)
-      open_datagrams(asio::ip::udp::endpoint(endpoint.address(), port));
+      open_datagrams({asio::ip::make_address(options.address), acceptor.port()});
     return {};
   }
 
@@ -63,86 +54,63 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
   void start(ConnectionHandler& to) {
     handler = &to;
     const auto self = shared_from_this();
-    spawn(acceptor.get_executor(), accept_connections(),
+    acceptor.start(
+        [self](auto socket, auto peer) { return self->admit(std::move(socket), std::move(peer)); });
+    spawn(context.get_executor(), sweep_deadlines(),
           [self](std::exception_ptr failure) { rethrow(failure); });
-    spawn(acceptor.get_executor(), sweep_deadlines(),
-          [self](std::exception_ptr failure) { rethrow(failure); });
-  }
-
-  void stop_accepting() {
-    boost::system::error_code ignored;
-    acceptor.close(ignored);
-    retry.cancel();
   }
 
   void stop() {
-    stop_accepting();
+    acceptor.stop();
     handler = nullptr;
     datagrams.reset();
     sweep.cancel();
     const auto all = std::move(connections);
     connections.clear();
-    for (const auto& [id, connection] : all) connection->close();
+    for (const auto& [id, one] : all) one.connection->close();
   }
 
   Connection* find(ConnectionId id) const {
     const auto found = connections.find(id);
-    return found == connections.end() ? nullptr : found->second.get();
+    return found == connections.end() ? nullptr : found->second.connection.get();
   }
 
   const TcpServerOptions options;
   asio::io_context& context;
   std::unique_ptr<DatagramServer> datagrams;  // null: there are none
-  tcp::acceptor acceptor;
-  asio::steady_timer sweep, retry;
+  intake::Acceptor acceptor;
+  asio::steady_timer sweep;
   ConnectionHandler* handler = nullptr;  // null once stopped
-  std::map<ConnectionId, std::shared_ptr<Connection>> connections;
-  std::set<ConnectionId> opened;  // those that the handler has heard of
+  struct One {
+    std::shared_ptr<Connection> connection;
+    std::unique_ptr<intake::Acceptor::Peer> peer;
+    bool is_open = false;  // the handler has heard of it
+  };
+  std::map<ConnectionId, One> connections;
   ConnectionId next_id = 1;
-  std::uint16_t port = 0;
   TcpCounters counters;
 
  private:
-  void admit(tcp::socket socket) {
+  asio::awaitable<void> admit(asio::ip::tcp::socket socket,
+                              std::unique_ptr<intake::Acceptor::Peer> peer) {
+    if (!handler) co_return;
     boost::system::error_code ignored;
-    if (connections.size() >= options.max_connections) {
-      ++counters.rejected_full;
-      socket.close(ignored);
-      return;
-    }
-    const auto peer = socket.remote_endpoint(ignored).address().to_string();
-    if (options.tls) make_room_for_newcomer(peer);
-    ++counters.accepted;
-    socket.set_option(tcp::no_delay(true), ignored);
     socket.set_option(asio::socket_base::send_buffer_size(options.send_buffer_bytes), ignored);
     const ConnectionId id = next_id++;
     auto connection = std::make_shared<Connection>(secure::Stream(std::move(socket), options.tls),
-                                                   peer, options.max_message_bytes,
+                                                   peer->address(), options.max_message_bytes,
                                                    options.outbox_bytes, options.plain_reply);
-    connections.emplace(id, connection);
+    // Who is late is told so, once there is TLS.
+    peer->set_cut([held = std::weak_ptr(connection)](intake::Acceptor::Cut why) {
+      const auto one = held.lock();
+      if (!one) return;
+      if (why == intake::Acceptor::Cut::Late && !one->is_greeting())
+        one->fail(ConnectionFault::HelloTimeout);
+      else
+        one->close();
+    });
+    connections.emplace(id, One{connection, std::move(peer)});
     connection->start(events_of(id));
-  }
-
-  // Who means it is done in milliseconds; so of too many the oldest is most likely one who does
-  // not, first of all if it has not got as far as TLS.
-  void make_room_for_newcomer(const std::string& peer) {
-    std::vector<std::shared_ptr<Connection>> newcomers, of_same;  // numbers ascend with time
-    for (const auto& [id, connection] : connections) {
-      if (!connection->is_newcomer()) continue;
-      newcomers.push_back(connection);
-      if (connection->peer_address() == peer) of_same.push_back(connection);
-    }
-    if (of_same.size() >= options.max_newcomers_per_address)
-      drop_oldest(of_same);
-    else if (newcomers.size() >= options.max_newcomers)
-      drop_oldest(newcomers);
-  }
-
-  void drop_oldest(const std::vector<std::shared_ptr<Connection>>& newcomers) {
-    ++counters.newcomers_dropped;
-    const auto greeting =
-        std::ranges::find_if(newcomers, [](const auto& c) { return c->is_greeting(); });
-    (greeting != newcomers.end() ? *greeting : newcomers.front())->close();
   }
 
   void expect_datagrams(ConnectionId id) {
@@ -154,11 +122,15 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     const auto self = shared_from_this();
     Connection::Events events;
     events.open = [self, id] {
-      self->opened.insert(id);
+      auto& one = self->connections.at(id);
+      one.is_open = true;
+      one.peer->show_life();
       self->expect_datagrams(id);
       if (self->handler) self->handler->on_open(id);
     };
     events.message = [self, id](BytesView message) {
+      if (const auto one = self->connections.find(id); one != self->connections.end())
+        one->second.peer->speak();
       ++self->counters.messages_in;
       self->counters.bytes_in += message.size() + wire::kHeaderBytes;
       if (self->handler) self->handler->on_message(id, message);
@@ -169,26 +141,13 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     };
     events.bytes_written = [self](std::size_t count) { self->counters.bytes_out += count; };
     events.closed = [self, id] {
-      const bool was_open = self->opened.erase(id) > 0;
       if (self->datagrams) self->datagrams->forget(id);
-      if (self->connections.erase(id) == 0) return;
-      if (!was_open) ++self->counters.handshakes_failed;
-      if (was_open && self->handler) self->handler->on_close(id);
+      const auto gone = self->connections.extract(id);
+      if (gone.empty()) return;
+      if (!gone.mapped().is_open) ++self->counters.handshakes_failed;
+      if (gone.mapped().is_open && self->handler) self->handler->on_close(id);
     };
     return events;
-  }
-
-  asio::awaitable<void> accept_connections() {
-    while (handler && acceptor.is_open()) {
-      auto [error, socket] = co_await acceptor.async_accept(kNoThrow);
-      if (!handler || !acceptor.is_open()) break;
-      if (error) {
-        retry.expires_after(kAcceptRetry);
-        co_await retry.async_wait(kNoThrow);
-        continue;
-      }
-      admit(std::move(socket));
-    }
   }
 
   asio::awaitable<void> sweep_deadlines() {
@@ -198,10 +157,9 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
       co_await sweep.async_wait(kNoThrow);
       if (!handler) break;
       all.clear();  // a copy: handlers close connections while we look at them
-      for (const auto& [id, connection] : connections) all.push_back(connection);
+      for (const auto& [id, one] : connections) all.push_back(one.connection);
       const auto now = Connection::Clock::now();
-      for (const auto& connection : all)
-        connection->check_deadlines(now, options.hello_deadline, options.idle_deadline);
+      for (const auto& connection : all) connection->check_deadlines(now, options.idle_deadline);
       all.clear();
       if (datagrams) datagrams->sweep();
     }
@@ -223,15 +181,6 @@ Status run(asio::io_context& context) {
   return {};
 }
 
-Status check_listen_address(const std::string& address) {
-  boost::system::error_code error;
-  asio::ip::make_address(address, error);
-  if (!error) return {};
-  return Error{ErrorCode::Usage, "--listen: '" + address +
-                                     "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
-                                     "machine only, 0.0.0.0 for any"};
-}
-
 Result<std::unique_ptr<TcpServer>> TcpServer::listen(asio::io_context& context,
                                                      const TcpServerOptions& options) {
   auto core = std::make_shared<Core>(context, options);
@@ -248,16 +197,21 @@ void TcpServer::start(ConnectionHandler& handler) {
   core_->start(handler);
 }
 void TcpServer::stop_accepting() {
-  core_->stop_accepting();
+  core_->acceptor.stop();
 }
 std::uint16_t TcpServer::port() const {
-  return core_->port;
+  return core_->acceptor.port();
 }
 std::size_t TcpServer::connection_count() const {
   return core_->connections.size();
 }
-const TcpCounters& TcpServer::counters() const {
-  return core_->counters;
+TcpCounters TcpServer::counters() const {
+  auto counters = core_->counters;
+  const auto& taken = core_->acceptor.counters();
+  counters.accepted = taken.accepted;
+  counters.rejected_full = taken.refused;
+  counters.newcomers_dropped = taken.cut;
+  return counters;
 }
 
 bool TcpServer::send(ConnectionId id, wire::SharedBytes frame) {
@@ -301,7 +255,7 @@ void TcpServer::close(ConnectionId id) {
   // A copy of the pointer: closing erases it from the map.
   const auto found = core_->connections.find(id);
   if (found == core_->connections.end()) return;
-  const auto connection = found->second;
+  const auto connection = found->second.connection;
   connection->close();
 }
 

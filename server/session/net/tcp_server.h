@@ -4,10 +4,9 @@
 // about what they say. With TLS the handler hears of a connection once its handshake is done.
 //
 // Bounds, so that no peer can take memory or time from the others:
-//   - connections: `max_connections`; one more is closed at once and counted;
-//   - with TLS, newcomers, who have sent no message yet: `max_newcomers` in all and
-//     `max_newcomers_per_address`; for one more the oldest is closed and counted. Handshake and
-//     first message share one deadline;
+//   - connections: `max_connections`, and of these newcomers, who have sent no message yet:
+//     `max_newcomers` in all and `max_newcomers_per_address`. acceptor.h says who is closed for one
+//     more. Handshake and first message share one deadline;
 //   - inbound: one frame per connection is buffered, at most `max_message_bytes`;
 //   - outbound: `outbox_bytes` per connection; send() says no when full, the caller decides;
 //   - time: a first message within `hello_deadline`, then one at least every `idle_deadline`;
@@ -37,10 +36,10 @@ namespace trocar::net {
 
 struct TcpServerOptions {
   std::string address = "127.0.0.1";
-  std::uint16_t port = 7690;                            // 0: any free port
-  std::size_t max_connections = kMaxParticipants + 12;  // some room to tell the next one "full"
-  std::size_t max_newcomers = 48;
-  std::size_t max_newcomers_per_address = 32;  // a class may sit behind one address
+  std::uint16_t port = 7690;                    // 0: any free port
+  int max_connections = kMaxParticipants + 12;  // some room to tell the next one "full"
+  int max_newcomers = 48;
+  int max_newcomers_per_address = 32;  // a class may sit behind one address
   std::uint32_t max_message_bytes = wire::kMaxUpstreamBytes;
   std::size_t outbox_bytes = 1024 * 1024;
   int send_buffer_bytes = 128 * 1024;
@@ -65,9 +64,6 @@ struct TcpCounters {
 // them throws ends that: an error says what it was, and the context is not run again.
 Status run(asio::io_context& context);
 
-// Whether it is an IPv4 or IPv6 address, as --listen wants it.
-Status check_listen_address(const std::string& address);
-
 class TcpServer final : public Connections {
  public:
   // Binds and listens; ErrorCode::ResourceMissing when the address or port cannot be had.
@@ -83,7 +79,7 @@ class TcpServer final : public Connections {
 
   std::uint16_t port() const;
   std::size_t connection_count() const;
-  const TcpCounters& counters() const;
+  TcpCounters counters() const;
   bool has_datagrams() const;
   // All zero without datagrams.
   DatagramCounters datagram_counters() const;

@@ -5,7 +5,7 @@
 #include <charconv>
 
 #include "common/base/printable.h"
-#include "server/session/access/room.h"
+#include "common/intake/room.h"
 #include "server/session/participants/look_alike.h"
 
 namespace trocar::participants {
@@ -28,7 +28,7 @@ std::string print_mm(float mm) {
 }  // namespace
 
 int places_for(Role role, const Places& places) {
-  if (role == Role::Observer) return access::places_for_observers(places.watchers);
+  if (role == Role::Observer) return intake::places_for_observers(places.watchers);
   return (places.watchers + 1) / 2;
 }
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/session/access/try_limiter.h"
+#include "common/intake/room.h"
 
 namespace trocar::replication {
 namespace {
@@ -84,8 +84,8 @@ bool Admission::has_too_many_alike(const Speaker& who) const {
     const auto* other = session_.audience.find(one.slot);
     return other && !one.is_away && is_counted(*other) && one.role == role &&
            other->applicant.code == who.applicant.code &&
-           access::counted_as(other->applicant.address) ==
-               access::counted_as(who.applicant.address);
+           intake::counted_as(other->applicant.address) ==
+               intake::counted_as(who.applicant.address);
   };
   return std::ranges::count_if(session_.roster.list(), is_alike) >=
          participants::places_alike(role, session_.options.places);

@@ -26,6 +26,21 @@ void write(const lesson::Stage& stage, const lesson::StageResult& result,
 
 }  // namespace
 
+std::optional<bleeding::Rules> bleeding_rules(const lesson::Lesson* lesson, bool is_asked_for) {
+  if (!is_asked_for && !(lesson && lesson->bleeds)) return {};
+  bleeding::Rules rules;
+  if (!lesson) return rules;
+  for (const auto& structure : lesson->structures)
+    if (structure.vessel_pressure_pa > 0)
+      rules.vessels.push_back({.name = structure.name,
+                               .from_m = structure.from_m,
+                               .to_m = structure.to_m,
+                               .radius_m = structure.radius_m,
+                               .pressure_pa = structure.vessel_pressure_pa,
+                               .most_flow_m3_s = structure.vessel_flow_m3_s});
+  return rules;
+}
+
 lesson::Moment moment_of(const step::PublishedFrame& frame, const wire::SurfaceLayout& layout,
                          std::vector<lesson::Tip>& tips) {
   tips.clear();

@@ -15,8 +15,7 @@ using follow::News;
 using wire::EndReason;
 
 constexpr std::chrono::milliseconds kSignPeriod{500};
-constexpr std::uint64_t kTakeOverNs = 2'000'000'000, kTakerNs = 10'000'000'000;
-constexpr std::uint64_t kReportNs = 1'100'000'000;         // the server takes one in a second
+constexpr std::uint64_t kTakeOverNs = 2'000'000'000;
 constexpr std::size_t kMostAnswerBytes = 8 * 1024 * 1024;  // that wait when another is begun
 constexpr std::size_t kMostAskBytes = 4096;
 constexpr double kMostAnswersPerSecond = 20;
@@ -26,10 +25,10 @@ constexpr std::size_t kMostBytesBeforePong =
     Publisher::kBusyBytes / 2;                         // so none holds back frames
 constexpr std::uint64_t kAnswerPauseNs = 250'000'000;  // from one to the next for the same asker
 
-std::uint64_t random_number() {
-  std::uint64_t number = 0;
-  secure::fill_random({reinterpret_cast<std::uint8_t*>(&number), sizeof number});
-  return number;
+PublisherOptions with_id(PublisherOptions options) {
+  auto& id = options.id;
+  if (id == 0) secure::fill_random({reinterpret_cast<std::uint8_t*>(&id), sizeof id});
+  return options;
 }
 
 // A Welcome for everybody: what was for this relay alone is left out.
@@ -58,9 +57,8 @@ Publisher::Publisher(asio::any_io_executor executor, std::unique_ptr<follow::Ups
                      std::unique_ptr<Channel> channel, PublisherOptions options)
     : upstream_(std::move(upstream)),
       channel_(std::move(channel)),
-      options_(std::move(options)),
+      options_(with_id(std::move(options))),
       subjects_(options_.session),
-      id_(options_.id != 0 ? options_.id : random_number()),
       next_(executor),
       answers_(kMostAnswersPerSecond, options_.clock_ns()),
       pongs_(kMostPongsPerSecond, options_.clock_ns()),
@@ -104,7 +102,7 @@ void Publisher::take_welcome(const proto::Welcome& welcome) {
   welcome_ = for_everybody(welcome);
   barrier_.reset();
   published_.reset();
-  reported_.reset();
+  watchers_.begin_anew();
   publish({welcome_});
   if (const auto hand_on = events_.welcome) hand_on(welcome);
 }
@@ -187,13 +185,14 @@ void Publisher::send(const std::string& subject, BytesView whole) {
                 whole.size(), kMostWholeBytes);
     return;
   }
-  for (auto& piece : cut(id_, number_, whole, most)) channel_->send(subject, std::move(piece));
+  for (auto& piece : cut(options_.id, number_, whole, most))
+    channel_->send(subject, std::move(piece));
 }
 
 void Publisher::take_stream(BytesView bytes) {
   const auto piece = read_piece(bytes);
-  if (!piece || piece->publisher == id_) return;
-  if (was_active_ && piece->publisher > id_) return;
+  if (!piece || piece->publisher == options_.id) return;
+  if (was_active_ && piece->publisher > options_.id) return;
   other_ns_ = options_.clock_ns();
   if (!std::exchange(is_waiting_, true))
     log::info("another relay publishes the session as {}: waits for its end", options_.session);
@@ -213,7 +212,7 @@ void Publisher::take_ask(BytesView bytes, const std::string& answer_to) {
     } else if (asked.has_ping()) {
       if (!std::exchange(is_ponged, true)) answer_ping(answer_to, asked.ping().client_time_us());
     } else if (asked.has_relay_report()) {
-      note_taker(answer_to, asked.relay_report().watchers());
+      watchers_.note_taker(answer_to, asked.relay_report().watchers(), options_.clock_ns());
     }
   }
 }
@@ -251,28 +250,16 @@ void Publisher::answer_all(const std::string& answer_to) {
 
 void Publisher::say(const proto::Envelope& message) {
   if (!message.has_relay_report()) return upstream_->say(message);
-  own_watchers_ = message.relay_report().watchers();
+  watchers_.note_own(message.relay_report().watchers());
   report();
 }
 
-void Publisher::note_taker(const std::string& taker, std::uint32_t watchers) {
-  if (takers_.size() >= kMostTakers && !takers_.contains(taker)) return;
-  takers_[taker] = {watchers, options_.clock_ns()};
-}
-
 void Publisher::report() {
-  const auto now = options_.clock_ns();
-  std::erase_if(takers_, [&](const auto& one) { return now - one.second.heard_ns > kTakerNs; });
-  if (!own_watchers_ || !upstream_->is_welcome() || now - reported_ns_ < kReportNs) return;
-  std::uint64_t sum = *own_watchers_;
-  for (const auto& [name, taker] : takers_) sum += taker.watchers;
-  const auto watchers =
-      static_cast<std::uint32_t>(std::min(sum, std::uint64_t{wire::kMostRelayed}));
-  if (reported_ == watchers) return;
-  reported_ = watchers;
-  reported_ns_ = now;
+  if (!upstream_->is_welcome()) return;
+  const auto watchers = watchers_.due(options_.clock_ns());
+  if (!watchers) return;
   proto::Envelope envelope;
-  envelope.mutable_relay_report()->set_watchers(watchers);
+  envelope.mutable_relay_report()->set_watchers(*watchers);
   upstream_->say(envelope);
 }
 
@@ -291,7 +278,7 @@ void Publisher::attend() {
   if (was_active_) {
     is_waiting_ = false;
     channel_->send(subjects_.stream,
-                   write_piece({.publisher = id_, .number = number_, .bytes = {}}));
+                   write_piece({.publisher = options_.id, .number = number_, .bytes = {}}));
   }
   report();
 }

@@ -28,7 +28,6 @@
 #include <boost/asio/steady_timer.hpp>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +36,7 @@
 #include "server/session/replication/frame_encoder.h"
 #include "server/watch/bus/channel.h"
 #include "server/watch/bus/subjects.h"
+#include "server/watch/bus/watcher_sum.h"
 #include "server/watch/follow/session_copy.h"
 #include "server/watch/follow/upstream.h"
 
@@ -51,7 +51,6 @@ struct PublisherOptions {
 class Publisher final : public follow::Upstream {
  public:
   static constexpr std::size_t kBusyBytes = 1024 * 1024;
-  static constexpr std::size_t kMostTakers = 256;  // of those who say how many watch there
 
   Publisher(asio::any_io_executor executor, std::unique_ptr<follow::Upstream> upstream,
             std::unique_ptr<Channel> channel, PublisherOptions options);
@@ -74,11 +73,6 @@ class Publisher final : public follow::Upstream {
   std::uint64_t returns() const override { return upstream_->returns(); }
 
  private:
-  struct Taker {
-    std::uint32_t watchers = 0;
-    std::uint64_t heard_ns = 0;
-  };
-
   void take_welcome(const proto::Welcome& welcome);
   Status take(const proto::Envelope& message, const wire::SharedBytes& framed);
   void take_over(wire::EndReason reason, const std::string& text);
@@ -90,7 +84,6 @@ class Publisher final : public follow::Upstream {
   void take_ask(BytesView bytes, const std::string& answer_to);
   void answer_ping(const std::string& answer_to, std::uint64_t client_time_us);
   void answer_all(const std::string& answer_to);
-  void note_taker(const std::string& taker, std::uint32_t watchers);
   void send(const std::string& subject, BytesView whole);
   void report();
   void attend_often();
@@ -101,7 +94,6 @@ class Publisher final : public follow::Upstream {
   const std::unique_ptr<Channel> channel_;
   const PublisherOptions options_;
   const Subjects subjects_;
-  const std::uint64_t id_;
   asio::steady_timer next_;
   pacing::Allowance answers_;  // to those who ask for all
   pacing::Allowance pongs_;
@@ -111,17 +103,15 @@ class Publisher final : public follow::Upstream {
   wire::SharedBytes barrier_, goodbye_;  // of the session's end; null: it goes on
   std::uint64_t number_ = 0;             // of the newest that went out
   replication::FrameEncoder encoder_;
-  step::SharedFrame published_;          // on which the next difference is based; null: a keyframe
-  Bytes answer_;                         // to who asks for all, as of number_; empty: not made
-  std::uint64_t other_ns_ = 0;           // when another publisher was heard
-  bool was_active_ = false;              // as attend() has found it
-  bool is_waiting_ = false;              // for another publisher, and the log says so
-  bool is_large_told_ = false;           // the log says that something did not fit
-  bool is_small_told_ = false;           // the log says that the bus takes too little
-  std::map<std::string, Taker> takers_;  // by the subject for answers to them
+  step::SharedFrame published_;  // on which the next difference is based; null: a keyframe
+  Bytes answer_;                 // to who asks for all, as of number_; empty: not made
+  std::uint64_t other_ns_ = 0;   // when another publisher was heard
+  bool was_active_ = false;      // as attend() has found it
+  bool is_waiting_ = false;      // for another publisher, and the log says so
+  bool is_large_told_ = false;   // the log says that something did not fit
+  bool is_small_told_ = false;   // the log says that the bus takes too little
   std::map<std::string, std::uint64_t> answered_;  // when, by that subject, of the last 0.25 s
-  std::optional<std::uint32_t> own_watchers_, reported_;
-  std::uint64_t reported_ns_ = 0;
+  WatcherSum watchers_;
 };
 
 }  // namespace trocar::bus

@@ -5,8 +5,8 @@ namespace trocar::page {
 Bridge::Bridge(std::vector<follow::SessionAddress> known, int most_connections,
                int most_connections_per_address)
     : sessions(std::move(known)),
-      observers(access::places_for_observers(most_connections),
-                access::places_for_observers(most_connections_per_address)) {}
+      observers(intake::places_for_observers(most_connections),
+                intake::places_for_observers(most_connections_per_address)) {}
 
 std::shared_ptr<Carrier> Bridge::carrier_of(const follow::SessionAddress& session, wire::Role role,
                                             const asio::any_io_executor& executor) {

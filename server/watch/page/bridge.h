@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "server/session/access/room.h"
+#include "common/intake/room.h"
 #include "server/session/access/try_limiter.h"
 #include "server/watch/follow/sessions.h"
 #include "server/watch/page/carrier.h"
@@ -32,7 +32,7 @@ class Bridge {
                                       const asio::any_io_executor& executor);
 
   follow::Sessions sessions;
-  access::Room observers;
+  intake::Room observers;
   access::TryLimiter limiter;
   PageCounters counters;
 

@@ -15,7 +15,7 @@ constexpr int kTries = 2;
 
 }  // namespace
 
-Seat::Seat(BrowserSocket& browser, Bridge& bridge, const JoinRequest& request)
+Seat::Seat(http::WebSocket& browser, Bridge& bridge, const JoinRequest& request)
     : browser_(browser),
       bridge_(bridge),
       request_(request),
@@ -182,7 +182,7 @@ asio::awaitable<void> Seat::write_down() {
 asio::awaitable<void> Seat::read_up() {
   while (!is_cut_ && !is_last_ && !is_lost_) {
     const auto message = co_await browser_.read();
-    using Kind = BrowserMessage::Kind;
+    using Kind = http::WebMessage::Kind;
     if (message.kind == Kind::Closed) {
       const auto bye = wire::encode_bye("the page was closed");
       const BytesView body = BytesView(*bye).subspan(wire::kHeaderBytes);

@@ -17,8 +17,8 @@
 #include <memory>
 #include <string>
 
+#include "common/http/web_socket.h"
 #include "server/watch/page/bridge.h"
-#include "server/watch/page/browser_socket.h"
 #include "server/watch/page/join_request.h"
 
 namespace trocar::page {
@@ -26,7 +26,7 @@ namespace trocar::page {
 class Seat final : public Carried, public std::enable_shared_from_this<Seat> {
  public:
   // All references outlive finish().
-  Seat(BrowserSocket& browser, Bridge& bridge, const JoinRequest& request);
+  Seat(http::WebSocket& browser, Bridge& bridge, const JoinRequest& request);
 
   // Until he is refused, leaves, or has to go; the browser has been told why by then.
   asio::awaitable<void> run(const follow::SessionAddress& session);
@@ -56,7 +56,7 @@ class Seat final : public Carried, public std::enable_shared_from_this<Seat> {
   void refuse(wire::EndReason reason, const std::string& text);
   void wake() { news_.cancel(); }
 
-  BrowserSocket& browser_;
+  http::WebSocket& browser_;
   Bridge& bridge_;
   const JoinRequest& request_;
   std::shared_ptr<Carrier> carrier_;

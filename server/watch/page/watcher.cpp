@@ -11,7 +11,7 @@ constexpr std::chrono::seconds kJoinDeadline{5};
 
 }  // namespace
 
-Watcher::Watcher(std::unique_ptr<BrowserSocket> browser, Bridge& bridge)
+Watcher::Watcher(std::unique_ptr<http::WebSocket> browser, Bridge& bridge)
     : browser_(std::move(browser)), bridge_(bridge), join_deadline_(browser_->executor()) {}
 
 void Watcher::cut() {
@@ -50,7 +50,7 @@ asio::awaitable<void> Watcher::run() {
 
 asio::awaitable<bool> Watcher::read_join() {
   const auto first = co_await browser_->read();
-  if (first.kind != BrowserMessage::Kind::Text) co_return false;
+  if (first.kind != http::WebMessage::Kind::Text) co_return false;
   const auto address = browser_->peer_address();
   const auto wait = bridge_.limiter.seconds_to_wait(address, monotonic_ns());
   if (wait > 0) {
@@ -82,9 +82,9 @@ asio::awaitable<void> Watcher::refuse(wire::EndReason reason, std::string text) 
 
 asio::awaitable<bool> Watcher::find_place(const std::string& address) {
   const auto place = bridge_.observers.place_for(address);
-  if (place == access::Room::Place::Free) co_return true;
+  if (place == intake::Room::Place::Free) co_return true;
   ++bridge_.counters.refused;
-  why_ = place == access::Room::Place::AllFull
+  why_ = place == intake::Room::Place::AllFull
              ? "full: all places of this page for observers are taken, come back later"
              : "full: all places for observers from your address are taken, come back later";
   std::string text = why_;

@@ -16,8 +16,8 @@
 #include <memory>
 #include <string>
 
+#include "common/http/web_socket.h"
 #include "server/watch/page/bridge.h"
-#include "server/watch/page/browser_socket.h"
 #include "server/watch/page/join_request.h"
 #include "server/watch/page/seat.h"
 
@@ -26,7 +26,7 @@ namespace trocar::page {
 class Watcher : public std::enable_shared_from_this<Watcher> {
  public:
   // `bridge` outlives this.
-  Watcher(std::unique_ptr<BrowserSocket> browser, Bridge& bridge);
+  Watcher(std::unique_ptr<http::WebSocket> browser, Bridge& bridge);
 
   // From the first message to the end; the caller keeps this alive until then.
   asio::awaitable<void> run();
@@ -39,7 +39,7 @@ class Watcher : public std::enable_shared_from_this<Watcher> {
   asio::awaitable<bool> find_place(const std::string& address);
   asio::awaitable<void> refuse(wire::EndReason reason, std::string text);
 
-  std::unique_ptr<BrowserSocket> browser_;
+  std::unique_ptr<http::WebSocket> browser_;
   Bridge& bridge_;
   JoinRequest request_;
   std::shared_ptr<Seat> seat_;

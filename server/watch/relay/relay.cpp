@@ -15,7 +15,7 @@ using wire::EndReason;
 constexpr milliseconds kAttentionPeriod{50};
 constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
 constexpr milliseconds kGoodbyePoll{20};
-constexpr std::size_t kMostNewcomers = 256;   // a crowd comes back at once
+constexpr int kMostNewcomers = 256;           // a crowd comes back at once
 constexpr std::size_t kMostEarly = 16;        // Participants, and little else
 constexpr std::size_t kSurfacesInOutbox = 8;  // as the server has it
 
@@ -97,7 +97,7 @@ Status Relay::open(std::size_t topology_bytes) {
   auto tcp = options_.tcp;
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, kSurfacesInOutbox * topology_bytes);
   tcp.max_newcomers = tcp.max_newcomers_per_address = kMostNewcomers;
-  tcp.max_connections = options_.most_watchers + kMostNewcomers;
+  tcp.max_connections = static_cast<int>(options_.most_watchers) + kMostNewcomers;
   tcp.plain_reply = wire::encode_goodbye(
       EndReason::Version,
       "this relay speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");
