@@ -21,7 +21,8 @@ using organ::Organ;
 constexpr const char* kAbout =
     "An organ: mesh, material and what holds it. It never changes.\n\n"
     "Organ(\"liver\") is a built-in one (liver, elastic-liver, lattice, plate, stomach, chest), "
-    "Organ(\"file.organ\") a file, and the path of a mesh imports it in metres; see import_mesh().";
+    "Organ(\"file.organ\") a file, Organ(\"file.toml\") one of parts, and the path of a mesh "
+    "imports it in metres; see import_mesh().";
 
 Organ load(const std::string& spec) {
   return value_of([&] {
@@ -72,6 +73,31 @@ py::array masses(const py::object& self) {
   return view_of(masses.data(), masses.size(), 0, self);
 }
 
+py::dict regions(const Organ& organ) {
+  py::dict out;
+  for (const auto& region : organ.regions) {
+    std::vector<std::uint32_t> numbers;
+    for (const auto node : region.nodes) numbers.push_back(node.value);
+    out[py::str(region.name)] = take_array(std::move(numbers), 0);
+  }
+  return out;
+}
+
+py::dict ties(const Organ& organ) {
+  py::dict out;
+  for (const auto& band : organ.ties) {
+    std::vector<double> places;
+    for (const auto& tie : band.ties)
+      for (const auto& end : tie.ends) {
+        const Vec3d place = organ::place_of(end, organ.mesh, organ.mesh.rest_positions);
+        places.insert(places.end(), {place.x, place.y, place.z});
+      }
+    out[py::str(band.name)] =
+        take_array(std::move(places), 3).attr("reshape")(band.ties.size(), 2, 3);
+  }
+  return out;
+}
+
 double total_mass(const Organ& organ) {
   return std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
 }
@@ -109,6 +135,11 @@ void bind_organ(py::module_& module) {
                              "outside; uint32 (triangles x 3), read-only view.")
       .def_property_readonly("fixed_nodes", &fixed_nodes,
                              "Nodes that are held, ascending; uint32, read-only view.")
+      .def_property_readonly("regions", &regions,
+                             "Node numbers of each part or region by its name, ascending; uint32.")
+      .def_property_readonly("ties", &ties,
+                             "Places that ties hold to one another at rest, m, by the name of "
+                             "their table; float64 (ties x 2 x 3).")
       .def_property_readonly("node_masses", &masses, "kg per node; float64, read-only view.")
       .def_property_readonly(
           "volume", [](const Organ& organ) { return total_volume(organ.mesh); },

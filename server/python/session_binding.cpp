@@ -126,8 +126,8 @@ void bind_tissue(py::class_<Session>& type) {
       .def_property_readonly("rest_positions", of_tissue(rest_of),
                              "Rest positions of all nodes, m, world frame; float64 (nodes x 3).")
       .def("counts", of_tissue(counts_of),
-           "Dict of nodes, tets, triangles, wound_triangles, pieces (that cuts have set free) and "
-           "edits (cuts and tears).")
+           "Dict of nodes, tets, triangles, wound_triangles, pieces (that cuts have set free), "
+           "edits (cuts and tears) and ties (that hold).")
       .def("incision", &incision, py::arg("line"), py::kw_only(), py::arg("depth"),
            py::arg("tolerance"),
            "What is cut along a line of 2 to 32 points at rest, m, to a depth towards the organ's "

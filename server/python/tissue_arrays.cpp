@@ -69,6 +69,7 @@ py::dict counts_of(const step::Simulation& simulation) {
   out["triangles"] = triangles;
   out["wound_triangles"] = wounds;
   out["pieces"] = simulation.context().pieces.list().size();
+  out["ties"] = topology.ties().whole_count();
   out["edits"] = simulation.state().cuts.history().size();
   return out;
 }

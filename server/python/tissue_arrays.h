@@ -17,7 +17,8 @@ pybind11::array wounds_of(const step::Simulation& simulation);
 pybind11::array tets_of(const step::Simulation& simulation);
 // Rest positions of all nodes, m, world frame; float64 (nodes x 3).
 pybind11::array rest_of(const step::Simulation& simulation);
-// How many there are of nodes, tets, triangles, wound triangles, free pieces and edits.
+// How many there are of nodes, tets, triangles, wound triangles, free pieces, edits, and ties that
+// hold.
 pybind11::dict counts_of(const step::Simulation& simulation);
 
 }  // namespace trocar::python

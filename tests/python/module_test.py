@@ -21,6 +21,29 @@ def put_on_top(session, organ, depth_m):
     session.put(0, top - [0, 0, depth_m], shaft=(0, 0, 1))
 
 
+class PartsTest(unittest.TestCase):
+    def test_a_grasper_draws_a_part_out_of_its_bed(self):
+        organ = trocar.Organ(str(SCENES / "bed.toml"))
+        self.assertEqual(set(organ.regions), {"liver", "gallbladder"})
+        self.assertEqual(sum(len(nodes) for nodes in organ.regions.values()), len(organ.nodes))
+        places = organ.ties["gallbladder-liver"]
+        self.assertEqual(places.shape[1:], (2, 3))
+        self.assertLess(np.linalg.norm(places[:, 1] - places[:, 0], axis=1).max(), 6e-3)
+        session = trocar.Session(organ)
+        session.step(1)
+        self.assertEqual(session.counts()["ties"], len(places))
+        part = organ.nodes[organ.regions["gallbladder"]]
+        fundus = part[part[:, 0].argmax()]
+        session.put(0, fundus, "grasp", shaft=(0, 1, 0))
+        session.step(150)
+        for i in range(150):
+            session.put(0, fundus + [0, 4e-4 * i, 0], "grasp", shaft=(0, 1, 0))
+            session.step(4)
+        counts = session.counts()
+        self.assertLess(counts["ties"], len(places) - 20)
+        self.assertEqual(counts["edits"], 0)
+
+
 class ScenarioTest(unittest.TestCase):
     def test_hashes_and_recording_are_those_of_trocar_sim(self):
         with tempfile.TemporaryDirectory() as folder:

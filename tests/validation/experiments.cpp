@@ -50,6 +50,8 @@ const std::vector<Experiment>& experiments() {
       {"ours/bar", "Bar in tension", "closed form: F L / (E A)", run_bar},
       {"ours/cantilever", "Thick cantilever", "closed form: Timoshenko", run_cantilever},
       {"ours/presses", "Contact forces of four organs", "quadratic elements, our own", run_presses},
+      {"ours/ties", "Two bodies that ties hold are parted", "the energy that ties are said to take",
+       run_ties},
       {"ours/indentation", "Indentation of a half-space", "closed forms: Hertz; bonded flat punch",
        run_indentation},
   };

@@ -47,6 +47,7 @@ void run_propagation_stomach(const Lab& lab, Section& section);
 void run_bar(const Lab& lab, Section& section);
 void run_cantilever(const Lab& lab, Section& section);
 void run_indentation(const Lab& lab, Section& section);
+void run_ties(const Lab& lab, Section& section);
 void run_presses(const Lab& lab, Section& section);
 
 }  // namespace trocar::validation

@@ -13,6 +13,7 @@
 #include "server/lab/fit/fit.h"
 #include "server/lab/scenario/settle.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/organs/catalogue/part_file.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
@@ -77,7 +78,8 @@ void print_fit(const fit::Fit& fit) {
 }
 
 Result<organ::Organ> organ_to_settle(const std::string& spec) {
-  if (std::filesystem::path(spec).extension() != ".toml") return catalogue::load_organ(spec);
+  if (std::filesystem::path(spec).extension() != ".toml" || catalogue::is_part_file(spec))
+    return catalogue::load_organ(spec);
   auto parsed = scenario::parse_scenario(spec);
   if (!parsed) return parsed.error();
   auto resolved = scenario::resolve(std::move(*parsed));

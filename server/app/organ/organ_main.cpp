@@ -30,6 +30,7 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/import_organ.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/organs/catalogue/part_file.h"
 #include "server/organs/dicom/dicom_reader.h"
 #include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/material/material_file.h"
@@ -153,16 +154,17 @@ Result<organ::Organ> make_from_scenario(const std::string& path, const std::opti
 }
 
 Result<organ::Organ> make_named(const std::string& name, const std::optional<int>& tets) {
-  if (std::filesystem::path(name).extension() == ".toml") return make_from_scenario(name, tets);
+  if (std::filesystem::path(name).extension() == ".toml" && !catalogue::is_part_file(name))
+    return make_from_scenario(name, tets);
   if (name == "lattice") {
     if (tets)
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
     return catalogue::make_lattice();
   }
-  if (name == "plate" || name == "chest" || name == "pegs") {
+  if (name == "plate" || name == "chest" || name == "pegs" || name.ends_with(".toml")) {
     if (tets)
       return Error{ErrorCode::Usage, "make " + name + ": --tets does not apply, its mesh is given"};
-    return *catalogue::load_organ(name);
+    return catalogue::load_organ(name);
   }
   if (tets.value_or(0) >= kManyTets)
     std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
@@ -366,8 +368,8 @@ void print_built_in_organs() {
 void add_commands(CLI::App& app, Options& options) {
   auto* make = app.add_subcommand("make", "make a built-in organ, or that of a scenario");
   make->add_option("NAME", options.made_name,
-                   "a built-in organ, which list shows; or a scenario's .toml file: its organ with "
-                   "its materials, regions and held nodes")
+                   "a built-in organ, which list shows; a part file (.toml); or a scenario's .toml "
+                   "file: its organ with its materials, regions and held nodes")
       ->required()
       ->check([](const std::string& name) -> std::string {
         if (name.ends_with(".toml")) return {};

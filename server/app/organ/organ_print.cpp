@@ -86,10 +86,15 @@ void print_materials(const organ::Organ& organ) {
   if (!organ.fibre_directions.empty())
     std::printf("  directed fibres     at %s nodes\n", grouped(nodes_with_fibres(organ)).c_str());
   for (const auto& region : organ.regions) {
-    std::printf("  region              %s, %s nodes:\n", region.name.c_str(),
-                grouped(region.nodes.size()).c_str());
+    std::printf("  region              %s, %s nodes%s%s:\n", region.name.c_str(),
+                grouped(region.nodes.size()).c_str(), region.look.empty() ? "" : ", drawn as ",
+                region.look.c_str());
     print_material(region.material);
   }
+  for (const auto& [name, law, ties] : organ.ties)
+    std::printf("  ties                %s, %s, %.4g J/m^2, %.4g kPa at %.4g mm\n", name.c_str(),
+                grouped(ties.size()).c_str(), law.toughness_j_m2, law.strength_pa / 1e3,
+                law.rise_m * 1e3);
   const Vec3d& g = organ.gravity_m_s2;
   if (length(g) > 0) std::printf("  gravity             %.4g %.4g %.4g m/s^2\n", g.x, g.y, g.z);
   if (!organ.stress_free_positions_m.empty())
@@ -207,6 +212,7 @@ void print_json(const organ::Organ& organ) {
   add_material(organ.material, json);
   json["fibre_nodes"] = nodes_with_fibres(organ);
   json["regions"] = organ.regions.size();
+  json["ties"] = organ::tie_count(organ.ties);
   json["gravity_m_s2"] = array_of(organ.gravity_m_s2);
   json["settled"] = !organ.stress_free_positions_m.empty();
   json["source_offset_m"] = array_of(organ.source_offset_m);

@@ -202,6 +202,8 @@ void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
   if (run.stable_dt_s())
     std::printf("explicit steps of %.4g s, stable up to %.4g s\n", run.scenario().run.dt_s(),
                 *run.stable_dt_s());
+  if (const auto& ties = run.simulation().state().cuts.topology().ties(); ties.count() > 0)
+    std::printf("%zu of %zu ties hold\n", ties.whole_count(), ties.count());
   std::printf("results in %s\n", folder.c_str());
 }
 

@@ -3,6 +3,7 @@
 #include "common/base/log.h"
 #include "common/base/nearest_word.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/join_parts.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::catalogue {
@@ -47,6 +48,15 @@ Result<organ::Organ> load_organ(const std::string& spec) {
     if (spec == each.name) return each.make();
   const std::filesystem::path path(spec);
   if (path.extension() == ".organ") return organ::read_organ(path);
+  if (path.extension() == ".toml") {
+    const auto file = read_part_file(path);
+    if (!file) return file.error();
+    auto joined = join_parts(*file);
+    if (!joined) return joined.error();
+    for (const std::string& note : joined->notes) log::info("{}: {}", spec, note);
+    for (const std::string& warning : joined->warnings) log::warn("{}: {}", spec, warning);
+    return std::move(joined->organ);
+  }
   if (can_be_imported(path)) {
     auto imported = import_organ(path, {});
     if (!imported) return imported.error();

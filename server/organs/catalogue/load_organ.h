@@ -23,9 +23,9 @@ std::span<const BuiltIn> built_in_organs();
 // Says that no built-in organ has this name, which was probably meant, and what to do.
 std::string no_built_in(const std::string& name);
 
-// The name of a built-in organ, or the path
-// of an .organ file or of a mesh (import_organ.h). A mesh is imported with the default options, and
-// its warnings are logged.
+// The name of a built-in organ, or the path of an .organ file, of a part file (.toml, part_file.h)
+// or of a mesh (import_organ.h). A mesh is imported with the default options, and warnings are
+// logged.
 Result<organ::Organ> load_organ(const std::string& spec);
 
 }  // namespace trocar::catalogue

@@ -76,6 +76,7 @@ struct MaterialRegion {
   std::vector<NodeIndex> nodes;  // ascending, distinct
   // The tets that are in it, likewise; empty: all whose four nodes are in it.
   std::vector<TetIndex> tets;
+  std::string look{};  // of a part: what it is drawn as; empty: as any
 
   bool operator==(const MaterialRegion&) const = default;
 };

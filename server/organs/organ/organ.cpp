@@ -77,7 +77,8 @@ Status check_regions(const Organ& organ) {
   if (organ.regions.size() > kMaxRegions)
     return broken(organ, "has more than " + std::to_string(kMaxRegions) + " material regions");
   for (const auto& region : organ.regions) {
-    if (region.nodes.empty() || region.name.empty() || region.name.size() > kMaxTextBytes)
+    if (region.nodes.empty() || region.name.empty() || region.name.size() > kMaxTextBytes ||
+        region.look.size() > kMostNameBytes)
       return broken(organ, "a material region needs a name and nodes");
     for (std::size_t i = 0; i < region.nodes.size(); ++i)
       if (region.nodes[i].value >= organ.mesh.node_count() ||
@@ -330,6 +331,22 @@ void follow_weights(Organ& organ, const std::vector<double>& weights_before) {
     if (after[i] != weights_before[i]) organ.node_masses_kg[i] *= after[i] / weights_before[i];
 }
 
+namespace {
+
+void hash_ties(StateHasher& hasher, const TieBand& band) {
+  std::vector<double> numbers{band.law.strength_pa, band.law.toughness_j_m2, band.law.rise_m};
+  for (const auto& tie : band.ties) {
+    for (const auto& end : tie.ends) {
+      numbers.push_back(end.triangle.value);
+      numbers.insert(numbers.end(), end.weights.begin(), end.weights.end());
+    }
+    numbers.push_back(tie.area_m2);
+  }
+  hash_array(hasher, numbers);
+}
+
+}  // namespace
+
 std::uint64_t organ_hash(const Organ& organ) {
   StateHasher hasher;
   hash_array(hasher, organ.mesh.rest_positions);
@@ -347,6 +364,7 @@ std::uint64_t organ_hash(const Organ& organ) {
   hash_array(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
   hash_array(hasher, organ.stress_free_positions_m);
   if (!organ.fibre_directions.empty()) hash_array(hasher, organ.fibre_directions);
+  for (const auto& band : organ.ties) hash_ties(hasher, band);
   return hasher.digest();
 }
 
@@ -366,6 +384,7 @@ Status validate(const Organ& organ) {
   if (auto s = check_stress_free(organ); !s) return s;
   if (auto s = check_fibres(organ); !s) return s;
   if (auto s = check_regions(organ); !s) return s;
+  if (auto s = validate(organ.ties, organ.mesh); !s) return broken(organ, s.error().message);
   if (auto s = validate(organ.depth_table); !s) return broken(organ, s.error().message);
   if (auto s = wire::validate(organ.fine_surface); !s) return broken(organ, s.error().message);
   return check_material(organ, organ.material);

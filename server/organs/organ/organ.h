@@ -13,6 +13,7 @@
 #include "server/organs/material/material.h"
 #include "server/organs/mesh/tet_mesh.h"
 #include "server/organs/organ/depth_table.h"
+#include "server/organs/organ/tie.h"
 
 namespace trocar::organ {
 
@@ -36,7 +37,8 @@ struct Organ {
   // Per node the direction of its fibres, such as Langer's lines of skin: of length 1, either sign,
   // or zero where Material::fibre_direction holds. Empty: it holds everywhere.
   std::vector<Vec3d> fibre_directions;
-  DepthTable depth_table;  // empty: not calibrated
+  std::vector<TieBand> ties;  // between places of the surface
+  DepthTable depth_table;     // empty: not calibrated
   // Clients draw this instead of the mesh's surface; empty: that. It changes no result.
   wire::FineSurface fine_surface;
 
@@ -96,9 +98,9 @@ void follow_weights(Organ& organ, const std::vector<double>& weights_before);
 // XXH3-64 over the organ's arrays (not over a file's bytes): names a mesh and material for files
 // and sessions that depend on it. Each array is preceded by its length (u64); in order: rest
 // positions, tets, links, boundary triangles, fixed nodes, node masses, the numbers of the
-// material, of each region with its nodes, gravity, stress-free positions, directions of fibres if
-// there are any. Name, source, source offset, depth table and fine surface are left out: they
-// change no result.
+// material, of each region with its nodes, gravity, stress-free positions, directions of fibres and
+// ties if there are any. Name, source, source offset, depth table and fine surface are left out:
+// they change no result.
 std::uint64_t organ_hash(const Organ& organ);
 
 // Validates mesh, sizes and ranges; the rest bounding box is centred on the origin and at most 2 m.

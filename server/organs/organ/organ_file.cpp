@@ -10,9 +10,10 @@
 namespace trocar::organ {
 namespace {
 
-// An organ with directions of fibres, or with regions that say their tets, is of a version that
-// programs which would ignore them refuse.
-constexpr std::uint32_t kOrganVersion = 4, kVersionWithoutTets = 3, kVersionWithoutFibres = 2;
+// An organ with directions of fibres, with regions that say their tets, or with ties, is of a
+// version that programs which would ignore them refuse.
+constexpr std::uint32_t kOrganVersion = 5, kVersionWithoutTies = 4, kVersionWithoutTets = 3,
+                        kVersionWithoutFibres = 2;
 constexpr PackedKind kOrganKind{"TROCARO1",
                                 "an .organ file",
                                 "make one with trocar-organ import",
@@ -22,7 +23,8 @@ constexpr PackedKind kOrganKind{"TROCARO1",
 
 std::uint32_t version_of(const Organ& organ) {
   const auto says_tets = [](const auto& region) { return !region.tets.empty(); };
-  return std::ranges::any_of(organ.regions, says_tets) ? kOrganVersion
+  if (!organ.ties.empty()) return kOrganVersion;
+  return std::ranges::any_of(organ.regions, says_tets) ? kVersionWithoutTies
          : organ.fibre_directions.empty()              ? kVersionWithoutFibres
                                                        : kVersionWithoutTets;
 }
@@ -151,6 +153,39 @@ Status take_material(const proto::Material& in, material::Material& m) {
   return {};
 }
 
+void put_ties(const TieBand& band, proto::TieBand& out) {
+  out.set_name(band.name);
+  out.set_strength_pa(band.law.strength_pa);
+  out.set_toughness_j_m2(band.law.toughness_j_m2);
+  out.set_rise_m(band.law.rise_m);
+  for (const auto& tie : band.ties) {
+    for (const auto& end : tie.ends) {
+      out.add_triangle(end.triangle.value);
+      for (const double weight : end.weights) out.add_weight(weight);
+    }
+    out.add_area_m2(tie.area_m2);
+  }
+}
+
+Status take_ties(const proto::TieBand& in, TieBand& band) {
+  band.name = in.name();
+  band.law = {in.strength_pa(), in.toughness_j_m2(), in.rise_m()};
+  const int count = in.area_m2_size();
+  if (in.triangle_size() != 2 * count || in.weight_size() != 6 * count)
+    return bad("organ: ties must have two triangles and six weights each");
+  for (int i = 0; i < count; ++i) {
+    auto& tie = band.ties.emplace_back();
+    tie.area_m2 = in.area_m2(i);
+    for (int e = 0; e < 2; ++e) {
+      auto& end = tie.ends[static_cast<std::size_t>(e)];
+      end.triangle = TriangleIndex(in.triangle(2 * i + e));
+      for (int k = 0; k < 3; ++k)
+        end.weights[static_cast<std::size_t>(k)] = in.weight(6 * i + 3 * e + k);
+    }
+  }
+  return {};
+}
+
 void put_depth_table(const DepthTable& table, proto::DepthTable& out) {
   out.set_error(table.error);
   out.set_tool_radius_m(table.tool_radius_m);
@@ -219,12 +254,14 @@ Bytes encode_organ(const Organ& organ) {
     put_material(region.material, *entry.mutable_material());
     for (const NodeIndex node : region.nodes) entry.add_node(node.value);
     for (const TetIndex tet : region.tets) entry.add_tet(tet.value);
+    if (!region.look.empty()) entry.set_look(region.look);
   }
   if (length(organ.gravity_m_s2) > 0)
     put_vector(organ.gravity_m_s2, message.mutable_gravity_m_s2());
   for (const Vec3d& p : organ.stress_free_positions_m)
     put_vector(p, message.mutable_stress_free_position_m());
   for (const Vec3d& f : organ.fibre_directions) put_vector(f, message.mutable_fibre_direction());
+  for (const auto& band : organ.ties) put_ties(band, *message.add_tie_band());
   if (!organ.depth_table.empty())
     put_depth_table(organ.depth_table, *message.mutable_depth_table());
   if (!organ.fine_surface.empty()) wire::write(organ.fine_surface, *message.mutable_fine_surface());
@@ -259,6 +296,7 @@ Result<Organ> decode_within(BytesView bytes, std::size_t file_bytes) {
     if (auto s = take_material(entry.material(), region.material); !s) return s.error();
     for (const std::uint32_t node : entry.node()) region.nodes.emplace_back(node);
     for (const std::uint32_t tet : entry.tet()) region.tets.emplace_back(tet);
+    region.look = entry.look();
   }
   if (message.gravity_m_s2_size() != 0 && message.gravity_m_s2_size() != 3)
     return bad("organ: gravity must be three numbers");
@@ -271,6 +309,8 @@ Result<Organ> decode_within(BytesView bytes, std::size_t file_bytes) {
           take_vectors("directions of fibres", message.fibre_direction(), organ.fibre_directions);
       !s)
     return s.error();
+  for (const auto& band : message.tie_band())
+    if (auto s = take_ties(band, organ.ties.emplace_back()); !s) return s.error();
   if (message.has_depth_table()) organ.depth_table = take_depth_table(message.depth_table());
   if (message.has_fine_surface()) {
     auto fine = wire::read(message.fine_surface());

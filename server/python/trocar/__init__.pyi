@@ -77,12 +77,12 @@ class Lesson:
 class Organ:
     """An organ: mesh, material and what holds it. It never changes.
 
-    Organ("liver") is a built-in one (liver, elastic-liver, lattice, plate, stomach, chest), Organ("file.organ") a file, and the path of a mesh imports it in metres; see import_mesh()."""
+    Organ("liver") is a built-in one (liver, elastic-liver, lattice, plate, stomach, chest), Organ("file.organ") a file, Organ("file.toml") one of parts, and the path of a mesh imports it in metres; see import_mesh()."""
 
     def __init__(self, spec: str) -> None:
         """An organ: mesh, material and what holds it. It never changes.
 
-        Organ("liver") is a built-in one (liver, elastic-liver, lattice, plate, stomach, chest), Organ("file.organ") a file, and the path of a mesh imports it in metres; see import_mesh()."""
+        Organ("liver") is a built-in one (liver, elastic-liver, lattice, plate, stomach, chest), Organ("file.organ") a file, Organ("file.toml") one of parts, and the path of a mesh imports it in metres; see import_mesh()."""
 
     @property
     def fixed_nodes(self) -> numpy.ndarray:
@@ -112,6 +112,10 @@ class Organ:
     def nodes(self) -> numpy.ndarray:
         """Rest positions, m, world frame; float64 (nodes x 3), read-only view."""
 
+    @property
+    def regions(self) -> dict:
+        """Node numbers of each part or region by its name, ascending; uint32."""
+
     def save(self, path: Union[str, os.PathLike]) -> None:
         """Writes an .organ file; it is whole or not there. Raises Error."""
 
@@ -126,6 +130,10 @@ class Organ:
     @property
     def tets(self) -> numpy.ndarray:
         """Node numbers of each tet; uint32 (tets x 4), read-only view."""
+
+    @property
+    def ties(self) -> dict:
+        """Places that ties hold to one another at rest, m, by the name of their table; float64 (ties x 2 x 3)."""
 
     @property
     def volume(self) -> float:
@@ -277,7 +285,7 @@ class Session:
         """Says "it is here", with the tip of a tool as the newest frame has it; returns right, wrong, not asked or no tissue."""
 
     def counts(self) -> dict:
-        """Dict of nodes, tets, triangles, wound_triangles, pieces (that cuts have set free) and edits (cuts and tears)."""
+        """Dict of nodes, tets, triangles, wound_triangles, pieces (that cuts have set free), edits (cuts and tears) and ties (that hold)."""
 
     def course(self) -> dict:
         """How far the lesson is: dict of stage, stages, is_over, progress (of the goal, 0 to 1), seconds, is_too_strong, points (0 to 100), target (m, or None) and results, a dict of is_reached, points and measures for each stage that is over. Raises Error without one."""

@@ -69,9 +69,10 @@ class BladeTable {
 
   void visit_state(world::StateArchive& archive);
 
- private:
   // Nobody's hand goes that fast: it has appeared there, and what lies between is not cut.
   static bool has_jumped(const Blade& blade, const EdgeEnds& ends);
+
+ private:
   static Vec3f stop_n(const Blade& blade);
 
   std::array<Blade, kMaxTools> blades_;

@@ -78,6 +78,23 @@ std::optional<topology::Edit> TissueCuts::cut(const BladeTable::Hands& hands,
   return edit();
 }
 
+std::optional<std::array<EdgeEnds, 2>> TissueCuts::sweep_of(ToolSlot tool,
+                                                            const hands::ToolTable& tools) const {
+  const Blade& blade = blades_[tool];
+  if (!blade.is_at_work || !blade.is_cutting || tools[tool].verb != tool::Verb::Cut)
+    return std::nullopt;
+  const auto now = hands::edge_of(tools[tool]);
+  if (BladeTable::has_jumped(blade, now)) return std::nullopt;
+  return std::array{blade.edge.ends(), now};
+}
+
+void TissueCuts::break_tie(std::size_t tie) {
+  topology_.ties().set_broken(tie);
+  for (const auto& end : topology_.ties()[tie].ends)
+    for (const auto node : end.nodes)
+      if (topology_.has_node(node)) topology_.mark(node);
+}
+
 // Blades take turns. Friction is on both sides of a blade that is as broad as the tool.
 void TissueCuts::look_at_edges(const hands::ToolTable& tools, const world::World& world,
                                double travel_m) {
@@ -105,7 +122,9 @@ void TissueCuts::record(cutting::CutEvents events) {
 
 // Brings the surface up to date with the topology and returns what has changed.
 topology::Edit TissueCuts::edit() {
-  return {topology_, new_nodes_, surface_.update(topology_)};
+  const auto& surface = surface_.update(topology_);
+  topology::follow_ties(surface, topology_);
+  return {topology_, new_nodes_, surface};
 }
 
 void TissueCuts::extend_layout(const topology::Edit& edit, const world::World& world) {

@@ -37,6 +37,10 @@ class TissueCuts {
   // Returns what the tissue does to a blade.
   const Wrench& felt(ToolSlot tool) const { return blades_[tool].felt; }
   const EdgeForce& edge(ToolSlot tool) const { return blades_[tool].edge; }
+  // Returns where the edge of a blade that cuts was after the last tick, and where it is now;
+  // nothing for any other tool.
+  std::optional<std::array<EdgeEnds, 2>> sweep_of(ToolSlot tool,
+                                                  const hands::ToolTable& tools) const;
   // Returns how fast a blade goes through whole tissue, m/s; 0 for one that does not cut.
   float cutting_speed_m_s(ToolSlot tool) const {
     const Blade& blade = blades_[tool];
@@ -54,6 +58,8 @@ class TissueCuts {
   std::optional<topology::Edit> cut(const BladeTable::Hands& hands, const world::World& world,
                                     double travel_m, CutReport& report);
   void end_edit() { topology_.clear_changes(); }
+  // Breaks a tie, whose nodes count as changed until end_edit().
+  void break_tie(std::size_t tie);
   // Gives what has come to the surface its slots and numbers. The world has applied the edit.
   void extend_layout(const topology::Edit& edit, const world::World& world);
 

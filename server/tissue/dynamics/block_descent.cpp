@@ -360,6 +360,7 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   NodeStep8 step = inertia_of(group, own);
   const bool has_near = (lanes & near_.lanes[group]) != 0, touched = is_touched(group, lanes);
   const bool is_linear = is_far_linear_ && !has_near && has_energies_[group] == 0 &&
+                         !tissue_.has_ties(group) &&
                          linear_far_field_->add(group, lanes, inverse_dt_of(group), step);
   if (!is_linear) {
     ask_energies(group, start_.data());
@@ -494,6 +495,7 @@ void BlockDescent::begin_step(const contact::ContactList& contacts, std::span<co
   plan_bands(near, settings.bands);
   plan_last_sweep(settings);
   schedule_sweeps(settings);
+  if (auto* const ties = tissue_.ties()) ties->use_memory(world.tie_extensions.data());
   if (auto* const relaxation = tissue_.relaxation())
     relaxation->begin_step(settings.dt, world.relaxation, workers_);
   begin_groups(world, loads, settings.bands);

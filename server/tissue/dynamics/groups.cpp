@@ -28,6 +28,7 @@ std::uint64_t code_of(const Vec3d& p) {
 
 template <typename Visit>
 void Groups::for_each_coupled(const topology::Topology& topology, NodeIndex node, Visit&& visit) {
+  topology.ties().for_each_tied(node, visit);
   if (coupling_ == Coupling::Elements) {
     topology.for_each_neighbour(node, visit);
     return;

@@ -3,11 +3,11 @@
 // Nodes in colours and groups of eight. No energy couples two nodes of one colour, so the nodes of
 // a colour are solved at once, by lanes and by workers, with the same result as one after another.
 //
-// Colours are greedy in ascending node order: over elements' nodes, or, for energies over a node's
-// whole smoothing domain, over nodes at distance two. Within a colour, nodes lie along a Morton
-// curve so that what is near in space is near in memory, and are sorted by valence within stretches
-// of the curve so that the lanes of a group have like amounts of work. A slot is a place in that
-// order: group * 8 + lane; slots without a node are padding.
+// Colours are greedy in ascending node order: over the nodes of elements and ties, or, for energies
+// over a node's whole smoothing domain, over nodes at distance two. Within a colour, nodes lie
+// along a Morton curve so that what is near in space is near in memory, and are sorted by valence
+// within stretches of the curve so that the lanes of a group have like amounts of work. A slot is a
+// place in that order: group * 8 + lane; slots without a node are padding.
 //
 // When the topology changes, update() follows it locally. A node that may keep its colour keeps its
 // slot. Others get, in ascending node order, the smallest colour that no node it couples with has,

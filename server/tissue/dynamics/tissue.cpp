@@ -62,6 +62,11 @@ Tissue::Tissue(const topology::Topology& topology, std::span<const Colour> colou
                                     }));
   add_measured<ReducedPolynomialLaw>(topology);
   add_measured<ExponentialLaw>(topology);
+  if (topology.ties().count() > 0) {
+    auto ties = std::make_unique<Ties>(topology, groups_);
+    ties_ = ties.get();
+    energies_.push_back(std::move(ties));
+  }
   add_relaxation(topology);
   resize_stresses();
 }
@@ -195,6 +200,7 @@ UpdateReport Tissue::update_topology(const topology::Topology& topology) {
   for (const auto node : groups_.moved()) {
     touch_node(node);
     topology.for_each_neighbour(node, touch_node);
+    topology.ties().for_each_tied(node, touch_node);
   }
   list_touched(touched_);
   wide_.clear();

@@ -15,6 +15,7 @@
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/dynamics/relaxed_stress.h"
 #include "server/tissue/dynamics/strain_scheme.h"
+#include "server/tissue/dynamics/ties.h"
 
 namespace trocar::dynamics {
 
@@ -98,6 +99,11 @@ class Tissue {
     return relaxation_ ? std::optional(relaxation_->figures()) : std::nullopt;
   }
 
+  // Returns the ties, whose memory is state; null: the organ has none.
+  Ties* ties() { return ties_; }
+  // Whether a tie meets at a node of the group.
+  bool has_ties(Group group) const { return ties_ != nullptr && ties_->act_on(group); }
+
   // Elastic energy in double, J; displacements per place of a node.
   double energy_j(std::span<const Vec3f> displacements) const;
 
@@ -106,6 +112,7 @@ class Tissue {
   std::unique_ptr<NodalStrain> nodal_strain_;  // null: nothing is averaged
   std::vector<std::unique_ptr<Energy>> energies_;
   std::vector<std::unique_ptr<NodalStrainEnergy>> averaged_;
+  Ties* ties_ = nullptr;  // of energies_
   const StrainScheme scheme_;
   // Three per slot: rows of the stress, Pa; beside them stiffness and drag. Empty: Implicit.
   std::vector<Float4> nodal_stresses_;

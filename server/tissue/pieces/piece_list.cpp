@@ -32,6 +32,7 @@ bool PieceList::reaches_body(const topology::Topology& topology, const world::Wo
       for (const auto node : topology.tet(t)) visit(node);
     }
     for (const auto node : topology.links_of(found_[i])) visit(node);
+    topology.ties().for_each_held(found_[i], visit);
   }
   if (is_held)
     for (const auto node : found_) held_.insert(node.value);

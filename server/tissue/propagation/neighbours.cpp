@@ -1,10 +1,18 @@
 #include "server/tissue/propagation/neighbours.h"
 
+#include <algorithm>
+
 namespace trocar::propagation {
 
-void Neighbours::update_changed(const topology::Topology& topology) {
-  for (const auto node : topology.changed()) {
+void Neighbours::update(const topology::Topology& topology, std::span<const NodeIndex> nodes) {
+  for (const auto node : nodes) {
     topology.neighbours_of(node, row_);
+    const auto elements = row_.size();
+    topology.ties().for_each_held(node, [&](NodeIndex j) { row_.push_back(j); });
+    if (row_.size() > elements) {
+      std::ranges::sort(row_);
+      row_.erase(std::unique(row_.begin(), row_.end()), row_.end());
+    }
     set(node, row_);
   }
   rows_.tidy();

@@ -1,7 +1,8 @@
 #pragma once
 
-// This table says which nodes are next to which: it is the organ's, and instead of its rows those
-// of nodes that an edit of the topology has changed since. Symmetric; rows ascending.
+// This table says which nodes are next to which, over elements and ties that hold: it is the
+// organ's, and instead of its rows those of nodes that are tied, or that an edit of the topology
+// has changed since. Symmetric; rows ascending.
 
 #include "common/base/blocks.h"
 #include "common/base/index.h"
@@ -28,7 +29,9 @@ class Neighbours {
   }
 
   // Takes the rows of topology.changed(). O(rows), and O(nodes) the first time.
-  void update_changed(const topology::Topology& topology);
+  void update_changed(const topology::Topology& topology) { update(topology, topology.changed()); }
+  // Takes the rows of these nodes.
+  void update(const topology::Topology& topology, std::span<const NodeIndex> nodes);
 
  private:
   void set(NodeIndex node, std::span<const NodeIndex> neighbours);

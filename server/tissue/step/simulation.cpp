@@ -9,6 +9,7 @@
 #include "server/tissue/cutting/edits.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/step/edit_followers.h"
+#include "server/tissue/step/tie_breaks.h"
 #include "server/tissue/topology/surface_mesh.h"
 
 namespace trocar::step {
@@ -57,6 +58,7 @@ std::unique_ptr<State> State::returned_to_mark(std::uint8_t number, const Scene&
 void State::visit_without_marks(world::StateArchive& archive) {
   cuts.visit_state(archive, [this](const topology::Edit& edit) { hand_out(edit, *this); });
   world.visit_state(archive);
+  if (archive.is_reading() && archive.ok()) read_breaks(cuts, world);
   tools.visit_state(archive);
   claims.visit_state(archive);
   grasps.visit_state(archive, world.node_count());
@@ -127,9 +129,13 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   for (const auto& events : state.cuts.history()) {
     const auto applied = cutting::apply(events, topology, places);
     TROCAR_ASSERT(applied.ok());
-    hand_out({topology, {}, surface.update(topology)}, state.world, contact, near, solve);
+    const auto& edit = surface.update(topology);
+    topology::follow_ties(edit, topology);
+    hand_out({topology, {}, edit}, state.world, contact, near, solve);
     topology.clear_changes();
   }
+  const auto tied = state.cuts.topology().ties().nodes();
+  near.neighbours.update(state.cuts.topology(), tied);
   // From now on everybody looks at the state's own topology.
   if (!state.cuts.history().empty())
     hand_out({state.cuts.topology(), {}, {}}, state.world, contact, near, solve);

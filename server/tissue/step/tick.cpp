@@ -7,6 +7,7 @@
 #include "server/tissue/contact/update_claims.h"
 #include "server/tissue/step/edit_followers.h"
 #include "server/tissue/step/rest.h"
+#include "server/tissue/step/tie_breaks.h"
 
 namespace trocar::step {
 
@@ -391,6 +392,7 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   report.near = fill_queue(contacts, loads, decisions, world, context.near);
   end(Stage::Queue);
   report.solve = solve_awake(contacts, has_rest, decisions, loads, state, context);
+  report.ties = follow_ties(decisions.waiting_tools, state, context);
   end(Stage::Solve);
   state.proxies.update(contacts, world, state.tools);
   end(Stage::Contacts);

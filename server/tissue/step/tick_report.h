@@ -100,6 +100,11 @@ struct SolveReport {
   float largest_move_m = 0;           // of a node in the whole tick, at most
 };
 
+struct TieReport {
+  std::uint32_t whole = 0;   // neither broken nor gone
+  std::uint32_t broken = 0;  // in this tick
+};
+
 // Each stage says this about itself.
 struct TickReport {
   Tick tick = 0;
@@ -108,6 +113,7 @@ struct TickReport {
   ContactReport contact;
   wire::NearFigures near;
   SolveReport solve;
+  TieReport ties;
   blades::CutReport cut;
   std::uint32_t faults = 0;  // TickFault bits
   std::uint64_t state_hash = 0;

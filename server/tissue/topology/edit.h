@@ -45,6 +45,9 @@ struct SurfaceEdit {
   }
 };
 
+// Ties go on from their rest places, after an edit of the surface and before it is handed out.
+void follow_ties(const SurfaceEdit& surface, Topology& topology);
+
 struct Edit {
   const Topology& topology;            // after the edit; changed() and parts() are the edit's
   std::span<const NewNode> new_nodes;  // in their order, which is that of the places

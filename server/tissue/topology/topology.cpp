@@ -29,6 +29,12 @@ void erase(Blocks<T>& lists, NodeIndex node, const T& item) {
   lists.resize(node.value, static_cast<std::uint32_t>(list.size() - 1));
 }
 
+Vec3d axis_of(const mesh::Tet& tet, std::span<const Vec3d> node_axes) {
+  std::array<Vec3d, 4> axes;
+  for (std::size_t i = 0; i < 4; ++i) axes[i] = node_axes[tet[i].value];
+  return organ::sum_of_axes(axes);
+}
+
 template <typename T>
 void assign(Blocks<T>& lists, NodeIndex node, std::span<const T> items) {
   std::ranges::copy(items,
@@ -39,7 +45,6 @@ void assign(Blocks<T>& lists, NodeIndex node, std::span<const T> items) {
 
 Topology::Topology(const organ::Organ& organ)
     : organ_(organ),
-      has_links_(!organ.mesh.links.empty()),
       has_fibre_axes_(!organ.fibre_directions.empty()),
       rest_(organ.mesh.rest_positions),
       stress_free_(organ.stress_free()),
@@ -48,7 +53,8 @@ Topology::Topology(const organ::Organ& organ)
       tet_materials_(organ::material_map(organ).tets),
       wound_faces_(organ.mesh.tets.size()),
       has_node_(organ.mesh.node_count(), 1),
-      is_changed_(organ.mesh.node_count()) {
+      is_changed_(organ.mesh.node_count()),
+      ties_(organ) {
   const auto& mesh = organ.mesh;
   node_tets_.reserve(mesh.node_tets.items.size());
   node_links_.reserve(mesh.node_links.items.size());
@@ -71,7 +77,7 @@ Topology::Topology(const organ::Organ& organ)
   node_links_.end_building();
   node_regions_.end_building();
   if (has_fibre_axes_)
-    for (const auto& tet : tets_) tet_axes_.push_back(sum_of_axes(tet));
+    for (const auto& tet : tets_) tet_axes_.push_back(axis_of(tet, node_axes_));
   for (std::size_t r = 0; r < organ.regions.size(); ++r)
     for (const auto node : organ.regions[r].nodes)
       insert(node_regions_, node, static_cast<std::uint16_t>(r));
@@ -100,12 +106,6 @@ std::uint16_t Topology::material_of(NodeIndex node) const {
 }
 std::uint16_t Topology::material_of(NodeIndex a, NodeIndex b) const {
   return material_of_all(std::array{a, b});
-}
-
-Vec3d Topology::sum_of_axes(const mesh::Tet& tet) const {
-  std::array<Vec3d, 4> axes;
-  for (std::size_t i = 0; i < 4; ++i) axes[i] = node_axes_[tet[i].value];
-  return organ::sum_of_axes(axes);
 }
 
 Vec3d Topology::fibre_axis(NodeIndex a, NodeIndex b) const {
@@ -177,7 +177,7 @@ void Topology::put_tet(TetIndex place, const mesh::Tet& tet) {
   tets_[place.value] = tet;
   tet_materials_[place.value] = material_of_all(tet);
   wound_faces_[place.value] = 0;
-  if (has_fibre_axes_) tet_axes_[place.value] = sum_of_axes(tet);
+  if (has_fibre_axes_) tet_axes_[place.value] = axis_of(tet, node_axes_);
   for (const auto node : tet) {
     TROCAR_ASSERT(has_node(node));
     insert(node_tets_, node, place);
@@ -195,7 +195,7 @@ void Topology::remove_tet(TetIndex tet) {
 }
 
 void Topology::put_link(NodeIndex a, NodeIndex b) {
-  TROCAR_ASSERT(has_links_ && has_node(a) && has_node(b) && a != b);
+  TROCAR_ASSERT(has_links() && has_node(a) && has_node(b) && a != b);
   insert(node_links_, a, b);
   insert(node_links_, b, a);
   mark(a);

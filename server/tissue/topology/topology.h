@@ -17,6 +17,7 @@
 
 #include "common/base/blocks.h"
 #include "server/organs/organ/organ.h"
+#include "server/tissue/topology/tie_net.h"
 
 namespace trocar::topology {
 
@@ -31,7 +32,7 @@ class Topology {
   bool has_node(NodeIndex node) const { return has_node_[node.value] != 0; }
   bool has_tet(TetIndex tet) const { return tets_[tet.value][0].is_valid(); }
   // Whether springs are along links, else along edges of tets: as in the organ at the start.
-  bool has_links() const { return has_links_; }
+  bool has_links() const { return !organ_.mesh.links.empty(); }
 
   std::span<const Vec3d> rest() const { return rest_; }                // m, per node
   std::span<const Vec3d> stress_free() const { return stress_free_; }  // m, per node
@@ -63,8 +64,12 @@ class Topology {
 
   // Directions of fibres as organ::Organ::fibre_directions, of a node; of a tet or a spring the
   // sum of its nodes' (organ::sum_of_axes), or what the tet was given. Zero: the material's.
-  Vec3d fibre_axis(NodeIndex node) const { return axis_at(node_axes_, node.value); }
-  Vec3d fibre_axis(TetIndex tet) const { return axis_at(tet_axes_, tet.value); }
+  Vec3d fibre_axis(NodeIndex node) const {
+    return node_axes_.empty() ? Vec3d{} : node_axes_[node.value];
+  }
+  Vec3d fibre_axis(TetIndex tet) const {
+    return tet_axes_.empty() ? Vec3d{} : tet_axes_[tet.value];
+  }
   Vec3d fibre_axis(NodeIndex a, NodeIndex b) const;
   // After put_node() and put_tet(): a part of a tet keeps the direction of the whole, so that a
   // split changes neither forces nor energy. Nothing where the organ has no directions.
@@ -101,17 +106,16 @@ class Topology {
   // Since the last clear_changes(): distinct, in the order of their first change.
   std::span<const NodeIndex> changed() const { return changed_; }
   void clear_changes();
-
- private:
-  static Vec3d axis_at(const std::vector<Vec3d>& axes, std::uint32_t place) {
-    return axes.empty() ? Vec3d{} : axes[place];
-  }
-  Vec3d sum_of_axes(const mesh::Tet& tet) const;
-  std::uint16_t material_of_all(std::span<const NodeIndex> nodes) const;
+  // Counts a node among these: what is tied to it has changed.
   void mark(NodeIndex node);
 
+  const TieNet& ties() const { return ties_; }
+  TieNet& ties() { return ties_; }
+
+ private:
+  std::uint16_t material_of_all(std::span<const NodeIndex> nodes) const;
+
   const organ::Organ& organ_;
-  const bool has_links_;
   const bool has_fibre_axes_;
   std::vector<Vec3d> rest_, stress_free_;
   std::vector<Vec3d> node_axes_, tet_axes_;  // empty unless has_fibre_axes_
@@ -124,6 +128,7 @@ class Topology {
   Blocks<NodeIndex> node_links_;
   Blocks<std::uint16_t> node_regions_;
   std::vector<NodeIndex> changed_;
+  TieNet ties_;
 };
 
 }  // namespace trocar::topology

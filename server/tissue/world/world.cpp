@@ -15,7 +15,8 @@ World::World(const organ::Organ& organ)
       far_poses(organ.mesh.node_count()),
       relaxation(organ),
       still_ticks(1),
-      calm_ticks(1) {
+      calm_ticks(1),
+      tie_extensions(organ::tie_count(organ.ties)) {
   const auto& mesh = organ.mesh;
   rest_positions.reserve(mesh.node_count());
   masses.reserve(mesh.node_count());
@@ -98,7 +99,10 @@ void World::visit_state(StateArchive& archive) {
   relaxation.visit_state(archive);
   archive.sized_array(still_ticks, static_cast<std::uint32_t>(node_count() + 1));
   archive.sized_array(calm_ticks, static_cast<std::uint32_t>(node_count() + 1));
+  archive.fixed_array(tie_extensions);  // takes no bytes where there are no ties
   if (!archive.is_reading()) return;
+  for (const float extension : tie_extensions)
+    if (!(extension >= 0 && extension <= 1e9f)) archive.fail();
   if (boundary > Boundary::Whole) archive.fail();
   for (std::size_t i = 0; i < node_count(); ++i)
     if (node_classes[i] > NodeClass::Asleep || !is_finite(displacements[i]) ||

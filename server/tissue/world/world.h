@@ -66,6 +66,7 @@ struct World {
   // Ticks in a row in which the body, and each free piece, hardly moved (server/tissue/pieces).
   std::vector<std::uint16_t> still_ticks;
   std::vector<std::uint16_t> calm_ticks;  // likewise: those of calm, at most 128
+  std::vector<float> tie_extensions;      // m, per tie: the largest so far
 
   // Brings all arrays up to date with an edit of the topology. Nodes whose elements have changed
   // are active: what a wound sets free is swept like what is touched, for a while.
