@@ -24,6 +24,7 @@ struct ScenarioResult {
   organ::Organ organ;
   py::dict times, values;
   py::array tick_hashes, positions;
+  py::dict thread_positions, thread_tensions;
   std::optional<std::uint64_t> state_hash;
   double seconds = 0;
   std::uint64_t unconverged_steps = 0, rejected_nodes = 0;
@@ -69,6 +70,27 @@ std::vector<float> positions_of(const world::World& world) {
   return out;
 }
 
+// By name, of a run that has threads.
+void add_threads(const ScenarioRun& run, ScenarioResult& result) {
+  const auto& threads = run.simulation().state().threads;
+  if (!threads) return;
+  std::size_t begin = 0;
+  for (const auto& rule : run.scenario().threads->threads) {
+    const auto end = begin + thread::nodes_along(rule.path_m).size();
+    std::vector<double> places;
+    for (auto i = begin; i < end; ++i) {
+      const Vec3d& p = threads->places_m[i];
+      places.insert(places.end(), {p.x, p.y, p.z});
+    }
+    const auto first = threads->tensions_n.begin();
+    std::vector<double> tensions(first + static_cast<std::ptrdiff_t>(begin),
+                                 first + static_cast<std::ptrdiff_t>(end - 1));
+    result.thread_positions[py::str(rule.name)] = take_array(std::move(places), 3);
+    result.thread_tensions[py::str(rule.name)] = take_array(std::move(tensions), 0);
+    begin = end;
+  }
+}
+
 Solver solver_named(const std::string& name) {
   if (name == "live") return Solver::Live;
   if (name == "full") return Solver::Full;
@@ -99,6 +121,7 @@ ScenarioResult run_scenario(const Scenario& scenario, const std::string& solver_
   if (!course.hashes.empty()) result.state_hash = course.hashes.back();
   result.tick_hashes = take_array(std::move(course.hashes), 0);
   result.positions = take_array(positions_of(run->world()), 3);
+  add_threads(*run, result);
   result.seconds = run->time_s();
   result.organ = run->organ();
   result.unconverged_steps = course.unconverged;
@@ -128,6 +151,12 @@ void bind_scenario(py::module_& module) {
                     "The last of tick_hashes; None without ticks.")
       .def_readonly("positions", &ScenarioResult::positions,
                     "Node positions at the end, m, world frame; float32 (nodes x 3).")
+      .def_readonly("thread_positions", &ScenarioResult::thread_positions,
+                    "By [[thread]]: positions of its nodes at the end, from its start, m, world "
+                    "frame; float64 (nodes x 3). Nodes are 1 mm apart at rest.")
+      .def_readonly("thread_tensions", &ScenarioResult::thread_tensions,
+                    "By [[thread]]: tension between each node and the next at the end, N, 0 where "
+                    "it is cut, negative where it is pressed; float64 (nodes - 1).")
       .def_readonly("organ", &ScenarioResult::organ,
                     "The organ with the scenario's materials, at rest.")
       .def_readonly("seconds", &ScenarioResult::seconds, "Simulated time at the end, s.")

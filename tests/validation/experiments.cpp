@@ -54,6 +54,8 @@ const std::vector<Experiment>& experiments() {
        run_ties},
       {"ours/indentation", "Indentation of a half-space", "closed forms: Hertz; bonded flat punch",
        run_indentation},
+      {"ours/thread", "Surgical thread: stretch, jerk, a peg, a knot",
+       "closed forms: F / (E A); Euler-Eytelwein; 2 T", run_threads},
   };
   return all;
 }

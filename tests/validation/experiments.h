@@ -49,5 +49,6 @@ void run_cantilever(const Lab& lab, Section& section);
 void run_indentation(const Lab& lab, Section& section);
 void run_ties(const Lab& lab, Section& section);
 void run_presses(const Lab& lab, Section& section);
+void run_threads(const Lab& lab, Section& section);
 
 }  // namespace trocar::validation

@@ -144,6 +144,7 @@ constexpr Family kFamilies[] = {
     {"ours/cantilever", "Cantilever", "springs"},
     {"ours/indentation", "Indentation", "hertz-springs"},
     {"ours/presses", "Presses", "slab-worst"},
+    {"ours/thread", "Thread", "capstan"},
     {"ours/ties", "Ties", "bed-ties"},
 };
 class EveryExperiment : public Validation, public ::testing::WithParamInterface<Family> {};

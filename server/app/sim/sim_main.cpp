@@ -234,6 +234,9 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
         ErrorCode::Usage,
         "--journal: recordings know no cutting = \"nakao\", which moves nodes of the mesh: "
         "remove one of the two"};
+  if (run.scenario().threads)
+    return Error{ErrorCode::Usage,
+                 "--journal: recordings do not hold threads yet: remove it, or each [[thread]]"};
   recording::Beginning beginning;
   beginning.starts_from_snapshot = run.scenario().run.starts_in_equilibrium;
   beginning.has_implicit_strain = run.has_implicit_strain();
@@ -278,6 +281,8 @@ Status run_scenario(const Options& options) {
     return Error{ErrorCode::Usage, "--journal: --solver fem has no ticks to record, remove it"};
   auto parsed = scenario::parse_scenario(options.scenario);
   if (!parsed) return parsed.error();
+  if (is_fem && parsed->threads)
+    return Error{ErrorCode::Usage, "--solver fem: knows no threads, remove it or each [[thread]]"};
   const std::filesystem::path folder =
       !options.out.empty()
           ? options.out

@@ -251,6 +251,8 @@ Vec3d ScenarioSolve::probe(std::size_t index) const {
       return mean(solver_->velocities());
     case scenario::ProbeQuantity::Reaction:
     case scenario::ProbeQuantity::ToolForce:
+    case scenario::ProbeQuantity::StartForce:
+    case scenario::ProbeQuantity::EndForce:
       break;
   }
   const Vector holding = solver_->reactions() - loads_at(time_s()).forces;

@@ -22,6 +22,8 @@ Unit unit_of(ProbeQuantity quantity) {
       return {"mm_s", 1e3};
     case ProbeQuantity::Reaction:
     case ProbeQuantity::ToolForce:
+    case ProbeQuantity::StartForce:
+    case ProbeQuantity::EndForce:
       return {"n", 1};
   }
   return {"", 1};

@@ -22,12 +22,17 @@ Drawn drawn(ProbeQuantity quantity) {
       return {"reaction (N)", 1};
     case ProbeQuantity::ToolForce:
       return {"force on the tool (N)", 1};
+    case ProbeQuantity::StartForce:
+    case ProbeQuantity::EndForce:
+      return {"force of the thread (N)", 1};
   }
   return {"", 1};
 }
 
 std::string subject(const scenario::ProbeRule& probe) {
-  return probe.set ? "set " + probe.set->name : "tool " + std::to_string(*probe.tool);
+  if (probe.set) return "set " + probe.set->name;
+  return probe.thread ? "thread " + std::to_string(*probe.thread)
+                      : "tool " + std::to_string(*probe.tool);
 }
 
 }  // namespace

@@ -23,6 +23,7 @@
 #include "server/organs/organ/organ.h"
 #include "server/papers/nakao/adaptive_splitter.h"
 #include "server/tissue/step/external_loads.h"
+#include "server/tissue/thread/rules.h"
 
 namespace trocar::scenario {
 
@@ -118,13 +119,16 @@ enum class ProbeQuantity : std::uint8_t {
   Displacement,  // mean of the set, m
   Velocity,      // mean of the set, m/s
   Reaction,      // total force that holds the set, on the tissue, N
-  ToolForce,     // of the tissue on a tool, N
+  ToolForce,     // of tissue and thread on a tool, N
+  StartForce,    // of a thread on what holds its start, N
+  EndForce,      // likewise of its end
 };
 
 struct ProbeRule {
   std::string name;  // of the columns
   std::optional<SetUse> set;
-  std::optional<std::uint32_t> tool;  // ToolForce
+  std::optional<std::uint32_t> tool;    // ToolForce
+  std::optional<std::uint32_t> thread;  // StartForce and EndForce
   Place place;
   ProbeQuantity quantity = ProbeQuantity::Displacement;
   std::uint32_t every_ticks = 10;
@@ -183,6 +187,7 @@ struct Scenario {
   std::optional<Vec3d> gravity_m_s2;  // without: the organ's own
   Place gravity_place;
   std::vector<tool::ScriptTool> tools;
+  std::optional<thread::Rules> threads;
   RunRule run;
   Place run_place;
   std::vector<ProbeRule> probes;

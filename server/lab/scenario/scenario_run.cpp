@@ -9,6 +9,7 @@
 #include "server/tissue/contact/contact_list.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/hands/sampling.h"
+#include "server/tissue/step/thread_stage.h"
 
 namespace trocar::scenario {
 namespace {
@@ -161,7 +162,8 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
       simulation_(resolved_.organ, threads,
                   {.cutting = cutting_of(scenario().run),
                    .loads = loads_of(resolved_),
-                   .strain_scheme = scheme_of(scenario().run, solver)}),
+                   .strain_scheme = scheme_of(scenario().run, solver),
+                   .threads = scenario().threads}),
       decisions_(decisions_of(scenario().run, solver, simulation_)),
       equilibrium_(simulation_, {.tolerance_n = static_cast<float>(scenario().run.tolerance_n),
                                  .max_sweeps = scenario().run.max_sweeps}) {
@@ -291,6 +293,8 @@ Vec3d ScenarioRun::force_on(ToolSlot tool) const {
   for (const auto& contact : contacts.tools)
     if (contact.tool == tool)
       force += to_double(contact::reaction_on(contacts, contact, state.world).force_n);
+  if (const auto& threads = simulation_.context().threads)
+    force += threads->step.pull(tool).force_n;
   return force;
 }
 
@@ -310,6 +314,10 @@ Vec3d ScenarioRun::probe(std::size_t index) const {
       return simulation_.loads().holding_force_n(watched_[index]);
     case scenario::ProbeQuantity::ToolForce:
       return force_on(ToolSlot{static_cast<std::uint8_t>(*rule.tool)});
+    case scenario::ProbeQuantity::StartForce:
+      return simulation_.context().threads->step.end_forces()[*rule.thread].start_n;
+    case scenario::ProbeQuantity::EndForce:
+      return simulation_.context().threads->step.end_forces()[*rule.thread].end_n;
   }
   return sum;
 }

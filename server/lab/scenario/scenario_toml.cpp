@@ -38,51 +38,94 @@ ScenarioOrgan read_organ(tool::TableReader& reader) {
   return organ;
 }
 
+// A probe of a quantity is of a set, of a tool or of a thread, and of nothing else.
+void check_owner(tool::TableReader& reader, const ProbeRule& probe) {
+  const bool is_of_tool = probe.quantity == ProbeQuantity::ToolForce;
+  const bool is_of_thread =
+      probe.quantity == ProbeQuantity::StartForce || probe.quantity == ProbeQuantity::EndForce;
+  if (is_of_thread) {
+    if (!probe.thread || probe.set || probe.tool)
+      reader.fail("quantity", "is of a thread: write thread = \"name\", no set and no tool");
+    return;
+  }
+  if (probe.thread)
+    reader.fail("quantity", "is not of a thread, write \"start_force\" or \"end_force\"");
+  if (is_of_tool && (!probe.tool || probe.set))
+    reader.fail("quantity",
+                "\"force\" is of a tool: write tool = 0 and no set (the force that "
+                "holds a set is \"reaction\")");
+  else if (!is_of_tool && (probe.tool || !probe.set))
+    reader.fail("quantity", "is of nodes: write set = \"name\" and no tool");
+}
+
+std::string name_of(const ProbeRule& probe, const Scenario& scenario) {
+  constexpr std::array<const char*, 6> kNames{"displacement", "velocity",    "reaction",
+                                              "force",        "start_force", "end_force"};
+  const auto owner = probe.set      ? probe.set->name
+                     : probe.thread ? scenario.threads->threads[*probe.thread].name
+                                    : "tool" + std::to_string(probe.tool.value_or(0));
+  return owner + "_" + kNames[static_cast<std::size_t>(probe.quantity)];
+}
+
+std::optional<std::uint32_t> read_thread_name(tool::TableReader& reader, const Scenario& scenario) {
+  const auto name = reader.string("thread");
+  if (!name) return std::nullopt;
+  const auto& threads =
+      scenario.threads ? scenario.threads->threads : std::vector<thread::ThreadRule>{};
+  for (std::uint32_t i = 0; i < threads.size(); ++i)
+    if (threads[i].name == *name) return i;
+  reader.fail("thread", "\"" + *name + "\" is no [[thread]]'s name");
+  return std::nullopt;
+}
+
+void read_rate(tool::TableReader& reader, ProbeRule& probe) {
+  const auto rate = reader.integer("rate_hz", 1, kScenarioRateLimit);
+  if (!rate) return;
+  probe.every_ticks = static_cast<std::uint32_t>(kScenarioRateLimit / *rate);
+  if (kScenarioRateLimit % *rate != 0)
+    reader.fail("rate_hz", "is " + std::to_string(*rate) +
+                               ", which does not divide 1000, write 100 or 125 for example");
+}
+
+ProbeRule read_probe(tool::TableReader& reader, const Scenario& scenario) {
+  const bool is_static = scenario.run.mode == RunMode::Static;
+  ProbeRule probe;
+  probe.set = read_set(reader);
+  const auto tool = reader.integer("tool", 0, kMaxTools - 1);
+  probe.thread = read_thread_name(reader, scenario);
+  probe.place = place_of(reader, probe.set ? "set" : probe.thread ? "thread" : "tool");
+  const auto quantity =
+      reader.choice<ProbeQuantity, 6>("quantity", {{{"displacement", ProbeQuantity::Displacement},
+                                                    {"velocity", ProbeQuantity::Velocity},
+                                                    {"reaction", ProbeQuantity::Reaction},
+                                                    {"force", ProbeQuantity::ToolForce},
+                                                    {"start_force", ProbeQuantity::StartForce},
+                                                    {"end_force", ProbeQuantity::EndForce}}});
+  if (!quantity)
+    reader.fail("quantity",
+                "is missing, write \"displacement\", \"velocity\", \"reaction\" or \"force\"");
+  probe.quantity = quantity.value_or(ProbeQuantity::Displacement);
+  if (tool) probe.tool = static_cast<std::uint32_t>(*tool);
+  check_owner(reader, probe);
+  if (tool && static_cast<std::size_t>(*tool) >= scenario.tools.size())
+    reader.fail("tool", "is " + std::to_string(*tool) + ", there are " +
+                            std::to_string(scenario.tools.size()) + " [[tool]]s, counted from 0");
+  read_rate(reader, probe);
+  if (is_static && reader.has("rate_hz"))
+    reader.fail("rate_hz", "is for mode = \"dynamic\", a static run has a row per load step");
+  if (is_static && probe.quantity == ProbeQuantity::Velocity)
+    reader.fail("quantity", "is zero in a static run, take another");
+  probe.name = name_of(probe, scenario);
+  return probe;
+}
+
 std::vector<ProbeRule> read_probes(tool::Document& document, tool::TableReader& root,
                                    const Scenario& scenario) {
-  const auto tool_count = scenario.tools.size();
-  const bool is_static = scenario.run.mode == RunMode::Static;
   std::vector<ProbeRule> probes;
   const auto tables = limited_tables(root, "probe");
   for (std::size_t i = 0; i < tables.size() && document.ok(); ++i) {
     tool::TableReader reader(document, *tables[i], table_entry("probe", i));
-    ProbeRule probe;
-    probe.set = read_set(reader);
-    const auto tool = reader.integer("tool", 0, kMaxTools - 1);
-    probe.place = place_of(reader, probe.set ? "set" : "tool");
-    const auto quantity =
-        reader.choice<ProbeQuantity, 4>("quantity", {{{"displacement", ProbeQuantity::Displacement},
-                                                      {"velocity", ProbeQuantity::Velocity},
-                                                      {"reaction", ProbeQuantity::Reaction},
-                                                      {"force", ProbeQuantity::ToolForce}}});
-    if (!quantity)
-      reader.fail("quantity",
-                  "is missing, write \"displacement\", \"velocity\", \"reaction\" or \"force\"");
-    probe.quantity = quantity.value_or(ProbeQuantity::Displacement);
-    const bool is_of_tool = probe.quantity == ProbeQuantity::ToolForce;
-    if (is_of_tool && (!tool || probe.set))
-      reader.fail("quantity",
-                  "\"force\" is of a tool: write tool = 0 and no set (the force that "
-                  "holds a set is \"reaction\")");
-    else if (!is_of_tool && (tool || !probe.set))
-      reader.fail("quantity", "is of nodes: write set = \"name\" and no tool");
-    if (tool && static_cast<std::size_t>(*tool) >= tool_count)
-      reader.fail("tool", "is " + std::to_string(*tool) + ", there are " +
-                              std::to_string(tool_count) + " [[tool]]s, counted from 0");
-    if (tool) probe.tool = static_cast<std::uint32_t>(*tool);
-    if (const auto rate = reader.integer("rate_hz", 1, kScenarioRateLimit)) {
-      probe.every_ticks = static_cast<std::uint32_t>(kScenarioRateLimit / *rate);
-      if (kScenarioRateLimit % *rate != 0)
-        reader.fail("rate_hz", "is " + std::to_string(*rate) +
-                                   ", which does not divide 1000, write 100 or 125 for example");
-    }
-    if (is_static && reader.has("rate_hz"))
-      reader.fail("rate_hz", "is for mode = \"dynamic\", a static run has a row per load step");
-    if (is_static && probe.quantity == ProbeQuantity::Velocity)
-      reader.fail("quantity", "is zero in a static run, take another");
-    constexpr std::array<const char*, 4> kNames{"displacement", "velocity", "reaction", "force"};
-    probe.name = (probe.set ? probe.set->name : "tool" + std::to_string(tool.value_or(0))) + "_" +
-                 kNames[static_cast<std::size_t>(probe.quantity)];
+    auto probe = read_probe(reader, scenario);
     for (const auto& other : probes)
       if (other.name == probe.name)
         reader.fail("quantity", "is probed twice for the same set or tool, remove one");
@@ -146,6 +189,13 @@ void read_scenario(tool::Document& document, tool::TableReader& root, Scenario& 
   if (!with("run", [&](tool::TableReader& r) { scenario.run = read_run(r); }))
     root.fail("run", "is missing, add [run] with seconds");
   scenario.run_place = place_of(root, "run");
+  scenario.threads = read_threads(document, root, scenario.gravity_m_s2);
+  const bool has_ticks = scenario.run.mode == RunMode::Dynamic &&
+                         scenario.run.integrator == Integrator::Implicit &&
+                         !scenario.run.starts_in_equilibrium;
+  if (scenario.threads && !has_ticks)
+    root.fail("thread",
+              "moves in ticks: write mode = \"dynamic\" in [run], without start or integrator");
   scenario.probes = read_probes(document, root, scenario);
   with("output", [&](tool::TableReader& r) { read_output(r, scenario); });
   root.finish();

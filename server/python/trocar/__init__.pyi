@@ -257,6 +257,14 @@ class ScenarioResult:
         """The last of tick_hashes; None without ticks."""
 
     @property
+    def thread_positions(self) -> dict:
+        """By [[thread]]: positions of its nodes at the end, from its start, m, world frame; float64 (nodes x 3). Nodes are 1 mm apart at rest."""
+
+    @property
+    def thread_tensions(self) -> dict:
+        """By [[thread]]: tension between each node and the next at the end, N, 0 where it is cut, negative where it is pressed; float64 (nodes - 1)."""
+
+    @property
     def tick_hashes(self) -> numpy.ndarray:
         """State hash after each tick, as a recording of trocar-sim --journal has it; uint64 (ticks). Empty for static runs and the explicit integrator."""
 

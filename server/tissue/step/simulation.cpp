@@ -9,6 +9,7 @@
 #include "server/tissue/cutting/edits.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/step/edit_followers.h"
+#include "server/tissue/step/thread_stage.h"
 #include "server/tissue/step/tie_breaks.h"
 #include "server/tissue/topology/surface_mesh.h"
 
@@ -22,6 +23,7 @@ State::State(const Scene& scene)
       strain_scheme(scene.strain_scheme) {
   dynamics::start_relaxed(scene.organ, world, strain_scheme);
   if (scene.rules.bleeding) blood.emplace();
+  if (scene.rules.threads) threads.emplace(*scene.rules.threads);
   for (const auto& load : scene.rules.loads.displaced)
     if (load.axes == kAllAxes)
       for (const auto node : load.nodes) world.node_classes[node.value] = world::NodeClass::Fixed;
@@ -51,6 +53,7 @@ std::unique_ptr<State> State::returned_to_mark(std::uint8_t number, const Scene&
   marked->claims.let_go(claims);
   marked->grasps = {};
   marked->proxies = {};
+  if (threads) marked->threads->let_go(*threads);
   marked->marks = marks;
   return marked;
 }
@@ -65,6 +68,7 @@ void State::visit_without_marks(world::StateArchive& archive) {
   proxies.visit_state(archive);
   archive.fixed_array(quantised);
   if (blood) blood->visit_state(archive);
+  if (threads) threads->visit_state(archive);
   self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
 
@@ -119,6 +123,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
       touches(s.organ),
       surface_displacements(state.cuts.layout().vertex_count()) {
   if (s.rules.bleeding) bleed.emplace(*s.rules.bleeding);
+  if (s.rules.threads) threads = std::make_shared<ThreadWork>(*s.rules.threads);
   contact.found.reserve();
   contact.requests.reserve(kMaxTools);
   near.seeds.reserve(2 * kMaxTools);

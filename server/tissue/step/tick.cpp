@@ -7,6 +7,7 @@
 #include "server/tissue/contact/update_claims.h"
 #include "server/tissue/step/edit_followers.h"
 #include "server/tissue/step/rest.h"
+#include "server/tissue/step/thread_stage.h"
 #include "server/tissue/step/tie_breaks.h"
 
 namespace trocar::step {
@@ -399,6 +400,8 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   report.cut = cut_tissue(decisions.waiting_tools, state, context.cut, context.pieces,
                           context.contact, context.near, context.solve);
   end(Stage::Cut);
+  if (context.threads) move_threads(state, *context.threads);
+  end(Stage::Solve);
   contact::update_claims(world, state.tools, contacts, context.contact.requests, state.claims,
                          state.grasps, context.outbox.claim_events);
   end(Stage::Claims);
@@ -410,6 +413,7 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   if (!publishes_frame(world.tick)) return;
   context.frame = publish(state, contacts, queue, context.solve.solver.tissue(), report,
                           context.touches, context.surface_displacements, context.outbox);
+  if (context.threads) add_pulls(*context.threads, *context.frame);
   end(Stage::Publish);
   if (!context.bleed) return;
   bleed(state.tools, state.cuts.layout(), *state.blood, *context.bleed, *context.frame);

@@ -21,6 +21,7 @@
 #include "server/tissue/step/mark.h"
 #include "server/tissue/step/published_frame.h"
 #include "server/tissue/step/tick_report.h"
+#include "server/tissue/thread/threads.h"
 #include "server/tissue/touch/touch_table.h"
 #include "server/tissue/world/world.h"
 
@@ -28,7 +29,8 @@ namespace trocar::step {
 
 static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 
-// By these rules a scene goes on. The default: those of a session in which nothing bleeds.
+// By these rules a scene goes on. The default: those of a session in which nothing bleeds, without
+// threads.
 struct SceneRules {
   // How blades cut. A method that moves nodes of the mesh needs the boundary whole and no
   // self-contact, and its states cannot be restored.
@@ -38,6 +40,7 @@ struct SceneRules {
   // ticks of a session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
   std::optional<dynamics::StrainScheme> strain_scheme;
   std::optional<bleeding::Rules> bleeding;  // of a session that bleeds
+  std::optional<thread::Rules> threads;     // of one with threads
 };
 
 // A scene is what is constant in a session.
@@ -64,6 +67,7 @@ struct State {
   contact::SelfContactTable self_contacts;
   const dynamics::StrainScheme strain_scheme;  // forces of relaxed stress are as it has them
   std::optional<bleeding::Blood> blood;        // of a session that bleeds
+  std::optional<thread::Threads> threads;      // of one with threads
   Marks marks;
 
   void visit(world::StateArchive& archive);
@@ -112,6 +116,8 @@ struct BleedWork {
   std::vector<bleeding::ToolAtWork> tools;
 };
 
+struct ThreadWork;  // server/tissue/step/thread_stage.h
+
 struct CutWork {
   std::vector<NodeIndex> may_tear;
   std::vector<std::uint32_t> held_pieces;  // each as often as tools hold it
@@ -134,7 +140,8 @@ struct StepContext {
   SolveWork solve;
   pieces::Pieces pieces;
   CutWork cut;
-  std::optional<BleedWork> bleed;  // of a session that bleeds
+  std::optional<BleedWork> bleed;       // of a session that bleeds
+  std::shared_ptr<ThreadWork> threads;  // of one with threads; of this context alone
   touch::TouchTable touches;
   std::vector<Vec3f> surface_displacements;  // scratch of the publish stage
   StateHasher hasher;

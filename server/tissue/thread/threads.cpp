@@ -1,0 +1,68 @@
+#include "server/tissue/thread/threads.h"
+
+#include <algorithm>
+
+namespace trocar::thread {
+
+Threads::Threads(const Rules& rules)
+    : was_closed(kMaxTools, 0), tool_poses(kMaxTools), has_pose(kMaxTools, 0) {
+  for (const auto& rule : rules.threads) {
+    const auto nodes = nodes_along(rule.path_m);
+    places_m.insert(places_m.end(), nodes.begin(), nodes.end());
+    is_joined.resize(places_m.size(), 1);
+    is_joined.back() = 0;
+  }
+  velocities_m_s.resize(node_count());
+  tensions_n.resize(node_count());
+  touched.resize(node_count(), kTouchesNothing);
+  creeps_m.resize(node_count());
+  overloaded.resize(node_count());
+}
+
+void Threads::let_go(const Threads& now) {
+  holds = {};
+  was_closed = now.was_closed;
+  tool_poses = now.tool_poses;
+  has_pose = now.has_pose;
+}
+
+void Threads::visit_state(world::StateArchive& archive) {
+  archive.fixed_array(places_m);
+  archive.fixed_array(velocities_m_s);
+  archive.fixed_array(tensions_n);
+  archive.fixed_array(is_joined);
+  archive.fixed_array(touched);
+  archive.fixed_array(creeps_m);
+  archive.fixed_array(overloaded);
+  archive.sized_array(pairs.first, kMostPairs);
+  archive.sized_array(pairs.second, kMostPairs);
+  archive.sized_array(pairs.place_first, kMostPairs);
+  archive.sized_array(pairs.place_second, kMostPairs);
+  archive.sized_array(pairs.press_n, kMostPairs);
+  archive.sized_array(pairs.creeps_m, kMostPairs);
+  archive.sized_array(holds.nodes, kMostHeld);
+  archive.sized_array(holds.tools, kMostHeld);
+  archive.sized_array(holds.offsets_m, kMostHeld);
+  archive.fixed_array(was_closed);
+  archive.fixed_array(tool_poses);
+  archive.fixed_array(has_pose);
+  if (archive.is_reading() && archive.ok() && !is_whole()) archive.fail();
+}
+
+// Returns whether what was read could have come about.
+bool Threads::is_whole() const {
+  const auto count = pairs.first.size(), held = holds.nodes.size(), nodes = node_count();
+  const bool has_sizes = pairs.second.size() == count && pairs.place_first.size() == count &&
+                         pairs.place_second.size() == count && pairs.press_n.size() == count &&
+                         pairs.creeps_m.size() == count && holds.tools.size() == held &&
+                         holds.offsets_m.size() == held && held <= nodes;
+  const auto begins_segment = [&](auto node) { return node + std::size_t{1} < nodes; };
+  return has_sizes && std::ranges::all_of(places_m, [](auto& p) { return is_finite(p); }) &&
+         std::ranges::all_of(velocities_m_s, [](auto& v) { return is_finite(v); }) &&
+         std::ranges::all_of(pairs.first, begins_segment) &&
+         std::ranges::all_of(pairs.second, begins_segment) && is_joined.back() == 0 &&
+         std::ranges::all_of(holds.nodes, [&](auto node) { return node < nodes; }) &&
+         std::ranges::all_of(holds.tools, [](auto tool) { return tool.is_valid(); });
+}
+
+}  // namespace trocar::thread
