@@ -89,6 +89,9 @@ CommandLine::CommandLine() {
   app_.add_option("--public-name", options_.public_name,
                   "how links name this machine, if not by the address")
       ->type_name("HOST[:PORT]");
+  app_.add_flag("--qr", options_.draws_codes,
+                "print the links as QR codes, too, as is done on a terminal where other machines "
+                "reach the page");
   app_.add_option("--recordings", options_.recordings_folder,
                   "folder whose recordings may be watched, those named by letters, digits, ., _ "
                   "and - [none]")

@@ -23,6 +23,7 @@ struct WebOptions {
   std::string public_name;  // HOST[:PORT] in links; empty: the address
   std::string state_folder, certificate_file, key_file;
   bool is_insecure = false;
+  bool draws_codes = false;  // QR codes of the links, wherever they are printed
   bool makes_new_key = false;
   int most_connections = 600, most_per_address = 200;
   int check_limit_s = 3600;  // of one recording's check

@@ -13,6 +13,7 @@
 #include "common/base/program.h"
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
+#include "server/app/web/links.h"
 #include "server/app/web/web_start.h"
 
 namespace trocar::app {
@@ -49,12 +50,12 @@ Status run_web(const WebOptions& options) {
       if (!error) end_in_order(context, server, last);
     });
   }
+  std::fputs(describe_links(options, server.port(), key).c_str(), stdout);
+  std::fflush(stdout);
   if (!options.ready_file.empty())
     if (auto written = write_text_file(options.ready_file, std::to_string(server.port()) + "\n");
         !written)
       return written;
-  std::fputs(describe_links(options, server.port(), key).c_str(), stdout);
-  std::fflush(stdout);
   log::info("listening at {}:{}, Ctrl-C ends it", options.address, server.port());
   if (server.metrics_port() != 0)
     log::info("figures at {}:{}/metrics", options.metrics_address, server.metrics_port());

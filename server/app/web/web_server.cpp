@@ -12,6 +12,7 @@
 #include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "common/secure/digest.h"
+#include "server/app/web/links.h"
 #include "server/app/web/recording_checks.h"
 #include "server/app/web/web_socket.h"
 #include "server/session/monitoring/exposition.h"
@@ -31,7 +32,7 @@ constexpr std::uint32_t kMostHeaderBytes = 8 * 1024;
 constexpr std::size_t kPieceBytes = 64 * 1024;
 // Old bytes wait in the kernel: few fit.
 constexpr int kSendBufferBytes = 64 * 1024;
-constexpr std::string_view kRecordingsPath = "/recordings";
+constexpr std::string_view kRecordingsPath = "/recordings", kLinksPath = "/links";
 
 // An answer: what goes before its body, and where the body is.
 struct Answer {
@@ -106,6 +107,11 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     return Error{ErrorCode::ResourceMissing, "--listen: " + options.address + ":" +
                                                  std::to_string(options.port) + ": " +
                                                  error.message() + ", choose another port"};
+  }
+
+  std::uint16_t own_port() const {
+    boost::system::error_code ignored;
+    return acceptor.local_endpoint(ignored).port();
   }
 
   // Whoever gets an answer knows that the program is well.
@@ -304,6 +310,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     }
     auto path = view_of(request.target());
     path = path.substr(0, path.find('?'));
+    if (path == kLinksPath) return answer_links(request, peer);
     if (path == kRecordingsPath ||
         (path.starts_with(kRecordingsPath) && path[kRecordingsPath.size()] == '/'))
       return answer_recordings(request, path.substr(kRecordingsPath.size()), peer);
@@ -330,12 +337,38 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     return answer;
   }
 
-  bool has_key(const Request& request) const {
+  // Links to a session are for who leads it, from this page and now.
+  Answer answer_links(const Request& request, const std::string& peer) {
+    auto name = view_of(request.target()).substr(kLinksPath.size());
+    name = name.starts_with("?session=") ? name.substr(name.find('=') + 1) : "";
+    const auto* session = bridge.sessions.find(std::string(name));
+    const auto code = secure::parse_join_code(bearer_of(request));
+    if (key_limiter.seconds_to_wait(peer, monotonic_ns()) > 0 || session == nullptr || !code ||
+        !bridge.has_leader(session->name, *code)) {
+      ++counters.forbidden;
+      key_limiter.record_wrong_try(peer, monotonic_ns());
+      return refuse(request, http::status::forbidden, "Who leads the session has the links.\n");
+    }
+    return answer_json(request, links_as_json(links_to(options, own_port(), *session)));
+  }
+
+  // Empty: the request names none.
+  static std::string_view bearer_of(const Request& request) {
     constexpr std::string_view kScheme = "Bearer ";
-    auto given = view_of(request[http::field::authorization]);
-    if (!given.starts_with(kScheme)) return false;
-    given.remove_prefix(kScheme.size());
+    const auto given = view_of(request[http::field::authorization]);
+    return given.starts_with(kScheme) ? given.substr(kScheme.size()) : std::string_view();
+  }
+
+  bool has_key(const Request& request) const {
+    const auto given = bearer_of(request);
     return secure::equal_in_constant_time(bytes_of(given), bytes_of(content.recordings_key));
+  }
+
+  Answer answer_json(const Request& request, std::string text) {
+    Answer answer = make_answer(request, http::status::ok, "application/json");
+    answer.text = std::move(text);
+    answer.length = answer.text.size();
+    return answer;
   }
 
   Answer answer_recordings(const Request& request, std::string_view rest, const std::string& peer) {
@@ -356,12 +389,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       return refuse(request, http::status::forbidden,
                     "Recordings need the key of their link: ask for a new link.\n");
     }
-    if (rest.empty()) {
-      Answer answer = make_answer(request, http::status::ok, "application/json");
-      answer.text = content.recordings->list();
-      answer.length = answer.text.size();
-      return answer;
-    }
+    if (rest.empty()) return answer_json(request, content.recordings->list());
     const auto name = rest.substr(1, rest.find('/', 1) - 1);
     const auto about = rest.substr(1 + name.size());
     auto recording = content.recordings->find(name);
@@ -370,11 +398,9 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       return refuse(request, http::status::not_found, "There is no such recording.\n");
     }
     if (about.empty()) return answer_part(request, std::move(recording));
-    Answer answer = make_answer(request, http::status::ok, "application/json");
-    answer.text = about == "/check" ? checks->ask(std::string(name), std::move(recording))
-                                    : checks->known(std::string(name), *recording);
-    answer.length = answer.text.size();
-    return answer;
+    return answer_json(request, about == "/check"
+                                    ? checks->ask(std::string(name), std::move(recording))
+                                    : checks->known(std::string(name), *recording));
   }
 
   Answer answer_part(const Request& request, std::unique_ptr<site::OpenRecording> recording) {
@@ -483,8 +509,7 @@ WebServer::~WebServer() {
 }
 
 std::uint16_t WebServer::port() const {
-  boost::system::error_code ignored;
-  return core_->acceptor.local_endpoint(ignored).port();
+  return core_->own_port();
 }
 
 std::uint16_t WebServer::metrics_port() const {

@@ -4,9 +4,9 @@
 //
 // Requests: GET and HEAD of the page's files, /recordings (a list), /recordings/NAME (with ranges),
 // /recordings/NAME/check (asks whether it verifies) and /recordings/NAME/checked (what is known of
-// that), and the WebSocket /session. Recordings need the key of their link. Bounds: connections in
-// all and from one address, 8 KiB of header, no body, 10 s for a request, 30 s for 64 KiB of an
-// answer.
+// that), /links?session=NAME, and the WebSocket /session. Recordings need the key of their link,
+// links the code of an instructor who is in the session from here. Bounds: connections in all and
+// from one address, 8 KiB of header, no body, 10 s for a request, 30 s for 64 KiB of an answer.
 
 #include "common/base/asio.h"  // before Boost: see there
 

@@ -1,7 +1,5 @@
 #include "server/app/web/web_start.h"
 
-#include <fmt/format.h>
-
 #include <array>
 #include <filesystem>
 #include <utility>
@@ -12,8 +10,6 @@
 #include "common/base/writable.h"
 #include "common/secure/digest.h"
 #include "common/secure/kept_identity.h"
-#include "common/secure/link_file.h"
-#include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
 #include "server/session/monitoring/http_acceptor.h"
 
@@ -83,17 +79,6 @@ Status check_state(const WebOptions& options) {
   return key ? Status() : Status(key.error());
 }
 
-std::string link_head(const WebOptions& options, std::uint16_t port) {
-  const std::string scheme = options.is_insecure ? "http://" : "https://";
-  if (!options.public_name.empty()) return scheme + options.public_name + "/";
-  const bool is_any = options.address == "0.0.0.0" || options.address == "::";
-  const bool is_ipv6 = options.address.find(':') != std::string::npos;
-  const std::string host = is_any    ? "HOST"
-                           : is_ipv6 ? "[" + options.address + "]"
-                                     : options.address;
-  return scheme + host + ":" + std::to_string(port) + "/";
-}
-
 }  // namespace
 
 Result<WebStart> prepare_web(const WebOptions& options) {
@@ -140,26 +125,6 @@ Status check_web_start(const WebOptions& options) {
     if (const auto ready = check_writable(options.ready_file); !ready)
       return Error{ready.error().code, "--ready-file: " + ready.error().message};
   return check_state(options);
-}
-
-std::string describe_links(const WebOptions& options, std::uint16_t port,
-                           const std::string& recordings_key) {
-  const auto head = link_head(options, port);
-  std::string text = "Links for a browser:\n";
-  for (std::size_t i = 0; i < options.sessions.size(); ++i) {
-    const auto& session = options.sessions[i];
-    const std::string which = i == 0 ? "" : "&session=" + session.name;
-    for (const auto* role : {"surgeon", "assistant", "instructor", "observer"}) {
-      std::string code = "CODE";
-      if (secure::is_loopback(session.host))
-        if (const auto known = secure::read_link_file(session.port, role); known)
-          code = secure::to_text(*known);
-      text += fmt::format("  {:<10}  {}#join={}&role={}{}\n", role, head, code, role, which);
-    }
-  }
-  if (!recordings_key.empty())
-    text += fmt::format("  {:<10}  {}#recordings={}\n", "recordings", head, recordings_key);
-  return text;
 }
 
 }  // namespace trocar::app

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/session/access/room.h"
@@ -31,13 +32,19 @@ class Bridge {
   std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session, wire::Role role,
                                       const asio::any_io_executor& executor);
 
+  // Who leads a session is in it, and has come with a code.
+  void note_leader(const std::string& session, const secure::JoinCode& code);
+  void forget_leader(const std::string& session, const secure::JoinCode& code);
+  bool has_leader(const std::string& session, const secure::JoinCode& code) const;
+
   follow::Sessions sessions;
   access::Room observers;
   access::TryLimiter limiter;
   PageCounters counters;
 
  private:
-  std::map<std::string, std::weak_ptr<Carrier>> carriers_;  // by the session's name
+  std::map<std::string, std::weak_ptr<Carrier>> carriers_;         // by the session's name
+  std::vector<std::pair<std::string, secure::JoinCode>> leaders_;  // by the session's name
 };
 
 }  // namespace trocar::page

@@ -36,6 +36,8 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
     is_there = co_await join(session);
     if (!is_there) co_await leave_carrier();
   }
+  const bool leads = is_there && request_.role == wire::Role::Instructor;
+  if (leads) bridge_.note_leader(session.name, request_.code);
   if (is_there) {
     ++bridge_.counters.watchers;
     ++bridge_.counters.joins;
@@ -51,6 +53,7 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
            "the session does not answer: try again in a moment");
   }
   co_await write_down();
+  if (leads) bridge_.forget_leader(session.name, request_.code);
   if (is_there) {
     co_await leave_carrier();
     --bridge_.counters.watchers;
