@@ -54,7 +54,7 @@ std::vector<RoleLink> links_to(const WebOptions& options, std::uint16_t port,
 }
 
 std::string describe_links(const WebOptions& options, std::uint16_t port,
-                           const std::string& recordings_key) {
+                           const std::string& recordings_key, const std::string& practice_key) {
   std::string text = "Links for a browser:\n", pictures;
   const bool has_pictures = shows_pictures(options);
   for (const auto& session : options.sessions)
@@ -65,6 +65,11 @@ std::string describe_links(const WebOptions& options, std::uint16_t port,
   if (!recordings_key.empty())
     text += fmt::format("  {:<10}  {}#recordings={}\n", "recordings", link_head(options, port),
                         recordings_key);
+  if (!practice_key.empty()) {
+    const auto url = link_head(options, port) + "#practice=" + practice_key;
+    text += fmt::format("  {:<10}  {}\n", "practice", url);
+    if (has_pictures) pictures += picture_of("practice", url);
+  }
   return text + pictures;
 }
 

@@ -31,7 +31,7 @@ void end_in_order(asio::io_context& context, WebServer& server, asio::steady_tim
 Status run_web(const WebOptions& options) {
   auto start = prepare_web(options);
   if (!start) return start.error();
-  const auto key = start->content.recordings_key;
+  const auto key = start->content.recordings_key, practice_key = start->content.practice_key;
   asio::io_context context{1};
   auto listening =
       WebServer::listen(context, options, std::move(start->content), std::move(start->tls));
@@ -50,7 +50,7 @@ Status run_web(const WebOptions& options) {
       if (!error) end_in_order(context, server, last);
     });
   }
-  std::fputs(describe_links(options, server.port(), key).c_str(), stdout);
+  std::fputs(describe_links(options, server.port(), key, practice_key).c_str(), stdout);
   std::fflush(stdout);
   if (!options.ready_file.empty())
     if (auto written = write_text_file(options.ready_file, std::to_string(server.port()) + "\n");

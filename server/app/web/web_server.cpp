@@ -13,6 +13,7 @@
 #include "common/base/timing.h"
 #include "common/secure/digest.h"
 #include "server/app/web/links.h"
+#include "server/app/web/practice.h"
 #include "server/app/web/recording_checks.h"
 #include "server/app/web/web_socket.h"
 #include "server/session/monitoring/exposition.h"
@@ -32,7 +33,8 @@ constexpr std::uint32_t kMostHeaderBytes = 8 * 1024;
 constexpr std::size_t kPieceBytes = 64 * 1024;
 // Old bytes wait in the kernel: few fit.
 constexpr int kSendBufferBytes = 64 * 1024;
-constexpr std::string_view kRecordingsPath = "/recordings", kLinksPath = "/links";
+constexpr std::string_view kRecordingsPath = "/recordings", kLinksPath = "/links",
+                           kPracticePath = "/practice";
 
 // An answer: what goes before its body, and where the body is.
 struct Answer {
@@ -70,6 +72,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   std::unique_ptr<monitoring::FiguresServer> figures;  // null: not asked for
   access::TryLimiter key_limiter;
   std::optional<RecordingChecks> checks;  // where there are recordings
+  std::shared_ptr<Practice> practice;     // null: nobody practises here
   WebCounters counters;
   access::Room room;  // for connections
   // Whoever is connected can be cut: by closing its socket, or its watcher.
@@ -124,6 +127,14 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
          [this] { return metrics(); }});
     if (!listening) return listening.error();
     figures = std::move(*listening);
+    return {};
+  }
+
+  Status open_practice() {
+    if (options.practice.offer.empty()) return {};
+    auto opened = Practice::open(context, options.practice, bridge);
+    if (!opened) return opened.error();
+    practice = std::move(*opened);
     return {};
   }
 
@@ -310,6 +321,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     }
     auto path = view_of(request.target());
     path = path.substr(0, path.find('?'));
+    if (path == kPracticePath) return answer_practice(request, peer);
     if (path == kLinksPath) return answer_links(request, peer);
     if (path == kRecordingsPath ||
         (path.starts_with(kRecordingsPath) && path[kRecordingsPath.size()] == '/'))
@@ -350,6 +362,22 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       return refuse(request, http::status::forbidden, "Who leads the session has the links.\n");
     }
     return answer_json(request, links_as_json(links_to(options, own_port(), *session)));
+  }
+
+  Answer answer_practice(const Request& request, const std::string& peer) {
+    const bool is_known = practice && key_limiter.seconds_to_wait(peer, monotonic_ns()) == 0 &&
+                          secure::equal_in_constant_time(bytes_of(bearer_of(request)),
+                                                         bytes_of(content.practice_key));
+    if (!is_known) {
+      ++counters.forbidden;
+      key_limiter.record_wrong_try(peer, monotonic_ns());
+      return refuse(request, http::status::forbidden,
+                    "Practice needs the key of its link: ask for a new link.\n");
+    }
+    constexpr std::string_view kTicket = "?ticket=";
+    auto ticket = view_of(request.target()).substr(kPracticePath.size());
+    ticket.remove_prefix(ticket.starts_with(kTicket) ? kTicket.size() : ticket.size());
+    return answer_json(request, practice->ask(std::string(ticket), access::counted_as(peer)));
   }
 
   // Empty: the request names none.
@@ -482,6 +510,10 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     text.counter("wrong_codes_total", "Wrong join codes.", number(b.wrong_codes));
     text.counter("sessions_unreachable_total", "Sessions that did not answer.",
                  number(b.unreachable));
+    text.gauge("practising", "People who practise alone now.",
+               practice ? static_cast<double>(practice->queue().practising()) : 0);
+    text.gauge("practice_waiting", "People who wait for that.",
+               practice ? static_cast<double>(practice->queue().waiting()) : 0);
     text.gauge("carriers", "Connections to sessions that many share, now.", number(b.carriers));
     text.counter("session_messages_total", "Messages from sessions.", number(sessions.messages));
     text.counter("session_bytes_total", "Bytes of these.", number(sessions.bytes));
@@ -499,7 +531,7 @@ Result<std::unique_ptr<WebServer>> WebServer::listen(asio::io_context& context,
                                                      const WebOptions& options, WebContent content,
                                                      secure::TlsContext tls) {
   auto core = std::make_shared<Core>(context, options, std::move(content), std::move(tls));
-  for (const auto open : {&Core::open, &Core::open_figures})
+  for (const auto open : {&Core::open, &Core::open_figures, &Core::open_practice})
     if (auto opened = (*core.*open)(); !opened) return opened.error();
   return std::unique_ptr<WebServer>(new WebServer(std::move(core)));
 }
@@ -520,6 +552,7 @@ void WebServer::start() {
   const auto core = core_;
   spawn(core->context.get_executor(), core->accept(),
         [core](std::exception_ptr failure) { rethrow(failure); });
+  if (core->practice) core->practice->start();
 }
 
 void WebServer::stop() {
@@ -529,6 +562,7 @@ void WebServer::stop() {
   core_->acceptor.close(ignored);
   if (core_->figures) core_->figures->stop();
   if (core_->checks) core_->checks->stop();
+  if (core_->practice) core_->practice->stop();
   auto cuts = core_->cuts;  // a copy: cutting takes entries out
   for (const auto& [id, cut] : cuts) cut();
 }

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kKeyBytes = 16;
-constexpr const char* kKeyFile = "web-recordings.key";
+constexpr const char *kKeyFile = "web-recordings.key", *kPracticeKeyFile = "web-practice.key";
 
 Result<fs::path> state_folder(const WebOptions& options) {
   if (!options.state_folder.empty()) return fs::absolute(options.state_folder);
@@ -35,7 +35,8 @@ fs::path page_folder(const WebOptions& options) {
 }
 
 bool needs_state(const WebOptions& options) {
-  return !options.is_insecure || !options.recordings_folder.empty();
+  return !options.is_insecure || !options.recordings_folder.empty() ||
+         !options.practice.offer.empty();
 }
 
 Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs::path& state) {
@@ -45,8 +46,7 @@ Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs:
   return secure::make_server_context(kept->identity, kept->source);
 }
 
-Result<std::string> read_or_make_key(const fs::path& state, bool makes_new) {
-  const auto file = state / kKeyFile;
+Result<std::string> read_or_make_key(const fs::path& file, bool makes_new) {
   std::error_code ignored;
   if (!makes_new && fs::exists(file, ignored)) {
     auto text = secure::read_private_file(file);
@@ -75,7 +75,7 @@ Status check_state(const WebOptions& options) {
   if (options.recordings_folder.empty() || options.makes_new_key ||
       !fs::exists(*state / kKeyFile, ignored))
     return {};
-  const auto key = read_or_make_key(*state, false);
+  const auto key = read_or_make_key(*state / kKeyFile, false);
   return key ? Status() : Status(key.error());
 }
 
@@ -95,10 +95,15 @@ Result<WebStart> prepare_web(const WebOptions& options) {
     if (!tls) return tls.error();
     start.tls = std::move(*tls);
   }
+  if (!options.practice.offer.empty()) {
+    auto key = read_or_make_key(*state / kPracticeKeyFile, false);
+    if (!key) return key.error();
+    start.content.practice_key = std::move(*key);
+  }
   if (options.recordings_folder.empty()) return start;
   auto recordings = site::Recordings::open(options.recordings_folder);
   if (!recordings) return recordings.error();
-  auto key = read_or_make_key(*state, options.makes_new_key);
+  auto key = read_or_make_key(*state / kKeyFile, options.makes_new_key);
   if (!key) return key.error();
   if (const auto names = recordings->left_out(); !names.empty())
     log::warn(

@@ -21,6 +21,12 @@ std::shared_ptr<Carrier> Bridge::carrier_of(const follow::SessionAddress& sessio
   return carrier;
 }
 
+std::shared_ptr<SessionUse> Bridge::use_of(const std::string& session) {
+  auto& use = uses[session];
+  if (!use) use = std::make_shared<SessionUse>();
+  return use;
+}
+
 void Bridge::note_leader(const std::string& session, const secure::JoinCode& code) {
   leaders_.emplace_back(session, code);
 }

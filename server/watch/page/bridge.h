@@ -6,6 +6,7 @@
 #include "common/base/asio.h"  // before Boost: see there
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -19,6 +20,12 @@
 #include "server/watch/page/page_counters.h"
 
 namespace trocar::page {
+
+// This is known of the people in a session.
+struct SessionUse {
+  int people = 0;
+  std::uint64_t deed_ns = 0;  // somebody has done something then, monotonic_ns()
+};
 
 class Bridge {
  public:
@@ -38,6 +45,8 @@ class Bridge {
   bool has_leader(const std::string& session, const secure::JoinCode& code) const;
 
   follow::Sessions sessions;
+  std::shared_ptr<SessionUse> use_of(const std::string& session);  // made if there is none
+  std::map<std::string, std::shared_ptr<SessionUse>> uses;         // by the session's name
   access::Room observers;
   access::TryLimiter limiter;
   PageCounters counters;

@@ -4,7 +4,6 @@
 #include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
-#include "server/watch/page/page_messages.h"
 
 namespace trocar::page {
 namespace {
@@ -39,6 +38,8 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
   const bool leads = is_there && request_.role == wire::Role::Instructor;
   if (leads) bridge_.note_leader(session.name, request_.code);
   if (is_there) {
+    use_ = bridge_.use_of(session.name);
+    ++use_->people;
     ++bridge_.counters.watchers;
     ++bridge_.counters.joins;
     is_up_running_ = true;
@@ -57,6 +58,7 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
   if (is_there) {
     co_await leave_carrier();
     --bridge_.counters.watchers;
+    --use_->people;
   }
 }
 
@@ -201,6 +203,7 @@ asio::awaitable<void> Seat::read_up() {
       why_ = "its page said something that a page may not say";
       break;
     }
+    if (deeds_.note(envelope)) use_->deed_ns = monotonic_ns();
     const BytesView body(message.bytes);
     const bool is_said = co_await carrier_->heed_page(number_, body);
     if (!is_said) break;
