@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <utility>
@@ -163,6 +164,10 @@ asio::awaitable<void> Practice::end_left_over() {
     log::warn("--practice: {}; it is tried again", words_of(answer));
     co_return;
   }
+  const auto offers = json.find("may_start");
+  if (offers != json.end() && std::ranges::find(*offers, Json(options_.offer)) == offers->end())
+    log::error("--practice: the hall does not offer {}, which nobody can begin: name one of {}",
+               options_.offer, printable(offers->dump(), 300));
   for (const auto& session : *sessions) {
     const auto people = session.find("people");
     const bool is_empty = people != session.end() && people->is_number() && *people == 0;
