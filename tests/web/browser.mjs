@@ -54,7 +54,7 @@ export async function startWeb(port, more = []) {
   fs.rmSync(ready, { force: true });
   const child = launch('trocar-web', ['--listen', `127.0.0.1:${port}`, '--ready-file', ready, ...sessions, ...more]);
   child.port = await portOf(child, ready);
-  await until('links', () => /\n {2}observer/.test(child.text));
+  await until('links', () => /\n {2}(observer|practice)/.test(child.text));
   return child;
 }
 export const base = () => `http://127.0.0.1:${world.web.port}/`;

@@ -133,8 +133,9 @@ class Watcher {
 class Holder extends Watcher {
   trips = [];
   sentMs = [];
-  constructor(port, code, name, replica) {
+  constructor(port, code, name, replica, row = 0) {
     super(port, code, name, replica, 'surgeon');
+    this.y = 0.2 + 0.01 * row; // several do not take each other's instrument for their own
     this.mover = setInterval(() => this.move(), 8);
   }
   move() {
@@ -143,7 +144,7 @@ class Holder extends Watcher {
     place.set([0x1a, 15, 0x0d]);
     place.writeFloatLE(x, 3);
     place.set([0x15], 7);
-    place.writeFloatLE(0.2, 8);
+    place.writeFloatLE(this.y, 8);
     place.set([0x1d], 12);
     place.writeFloatLE(0.2, 13);
     const one = Buffer.alloc(4);
@@ -160,7 +161,7 @@ class Holder extends Watcher {
     const tools = new Float32Array(this.replica.memory.buffer, at, 23 * count);
     for (let i = 0; i < tools.length; i += 23) {
       const number = Math.round((tools[i + 13] - 0.4) * 1e6);
-      if (Math.abs(tools[i + 14] - 0.2) > 1e-4 || number < 0 || number >= this.sentMs.length || number === this.seen) continue;
+      if (Math.abs(tools[i + 14] - this.y) > 1e-4 || number < 0 || number >= this.sentMs.length || number === this.seen) continue;
       this.seen = number;
       this.trips.push(performance.now() - this.sentMs[number]);
     }
@@ -280,6 +281,30 @@ async function measureWatchers(web, server, code) {
   }
 }
 
+// As many pages that hold an instrument, each over a connection of its own; the first and the last of
+// them know how old their pictures are, and how long a hand takes to come back.
+async function measureHolders(web, server, code) {
+  result.holders = [];
+  for (const count of (process.env.TROCAR_HOLDERS ?? '1 4 16').split(' ').map(Number)) {
+    const holders = [];
+    for (let i = 0; i < count; i++) {
+      const knows = i === 0 || i === count - 1;
+      holders.push(new Holder(web.port, code, `Holder ${count}-${i}`, knows ? await loadReplica() : null, i));
+      await sleep(60);
+    }
+    await sleep(3000);
+    const known = holders.filter(h => h.replica);
+    for (const holder of known) holder.ages = [], holder.trips = [];
+    const before = [cpu(web), cpu(server), cpu(server, 'network'), holders.map(h => h.frames), performance.now()];
+    await sleep(kSeconds * 1000);
+    const seconds = (performance.now() - before[4]) / 1000, rates = holders.map((h, i) => (h.frames - before[3][i]) / seconds);
+    const ages = known.flatMap(h => h.ages), trips = known.flatMap(h => h.trips);
+    result.holders.push({ count, joined: holders.filter(h => h.frames > 0).length, webCpu: (cpu(web) - before[0]) / seconds, serverCpu: (cpu(server) - before[1]) / seconds, networkCpu: (cpu(server, 'network') - before[2]) / seconds, framesPerSecond: quantile(rates, 0.5), least: Math.min(...rates), age: quantile(ages, 0.5), age99: quantile(ages, 0.99), trip: quantile(trips, 0.5), trip99: quantile(trips, 0.99) });
+    for (const holder of holders) holder.close();
+    await sleep(1000);
+  }
+}
+
 function table() {
   const r = result, n = (value, digits = 0) => value.toFixed(digits);
   const lines = ['| figure | measured |', '|---|---|',
@@ -292,31 +317,37 @@ function table() {
     '| round trip | loss | hand to tissue and back, median | 99 % | age, median | age, 99 % |', '|---|---|---|---|---|---|',
     ...r.hands.map(c => `| ${c.roundTrip} ms | ${c.loss} % | ${n(c.trip)} ms | ${n(c.trip99)} ms | ${n(c.age)} ms | ${n(c.age99)} ms |`), '',
     '| watchers | of the program, CPU | of the server, CPU | its network | from the session | frames per second, median | least | memory |', '|---|---|---|---|---|---|---|---|',
-    ...r.watchers.map(w => `| ${w.joined} | ${n(w.webCpu * 100)} % | ${n(w.serverCpu * 100)} % | ${n(w.networkCpu * 100, 1)} % | ${n(w.sessionMbit, 1)} Mbit/s | ${n(w.framesPerSecond)} | ${n(w.least)} | ${n(w.webMb)} MB |`)];
+    ...r.watchers.map(w => `| ${w.joined} | ${n(w.webCpu * 100)} % | ${n(w.serverCpu * 100)} % | ${n(w.networkCpu * 100, 1)} % | ${n(w.sessionMbit, 1)} Mbit/s | ${n(w.framesPerSecond)} | ${n(w.least)} | ${n(w.webMb)} MB |`), '',
+    '| pages with an instrument | of the program, CPU | for each page | of the server, CPU | its network | age, median | age, 99 % | hand to tissue and back, median | 99 % | frames per second, median | least |', '|---|---|---|---|---|---|---|---|---|---|---|',
+    ...r.holders.map(h => `| ${h.joined} | ${n(h.webCpu * 100)} % | ${n(h.webCpu / h.count * 100, 2)} % | ${n(h.serverCpu * 100)} % | ${n(h.networkCpu * 100, 1)} % | ${n(h.age)} ms | ${n(h.age99)} ms | ${n(h.trip)} ms | ${n(h.trip99)} ms | ${n(h.framesPerSecond)} | ${n(h.least)} |`)];
   return lines.join('\n') + '\n';
 }
 
 const server = await started('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--journal', `${TROCAR_WORK}/figures.mcap`, ...(process.env.TROCAR_SERVER_OPTIONS ?? '--max-watchers 200').split(' ').filter(Boolean)]);
 while (!/observer\s+\S{19}/.test(server.text)) await sleep(100);
 const codes = Object.fromEntries([...server.text.matchAll(/^ {2}(\w+) +(\S{19}) /gm)].map(m => [m[1], m[2]]));
-for (const scene of ['lift', 'press'])
-  launch('trocar-client', ['--server', `127.0.0.1:${server.port}`, '--name', scene, '--no-render', '--join', codes.surgeon, '--script', `${TROCAR_ROOT}/deploy/scenes/${scene}.toml`]);
+const hands = ['lift', 'press'].map(scene =>
+  launch('trocar-client', ['--server', `127.0.0.1:${server.port}`, '--name', scene, '--no-render', '--join', codes.surgeon, '--script', `${TROCAR_ROOT}/deploy/scenes/${scene}.toml`]));
 fs.mkdirSync(`${TROCAR_WORK}/recordings`, { recursive: true });
 fs.copyFileSync(TROCAR_RECORDING, `${TROCAR_WORK}/recordings/lesson.mcap`);
 const web = await started('trocar-web', ['--insecure-loopback', '--listen', '127.0.0.1:0', '--session', `127.0.0.1:${server.port}`, '--recordings', `${TROCAR_WORK}/recordings`, '--metrics', '127.0.0.1:0', '--max-connections-per-address', '400']);
 const key = web.text.match(/#recordings=(\w+)/)[1], base = `http://127.0.0.1:${web.port}/`;
 try {
   await measureSize();
-  const only = process.env.TROCAR_ONLY ?? 'browser networks hands watchers';
+  const only = process.env.TROCAR_ONLY ?? 'browser networks hands watchers holders';
   if (only.includes('browser')) await measureBrowser(`${base}#join=${codes.observer}&role=observer&name=Eve`, `${base}#recordings=${key}&file=lesson.mcap`);
   if (only.includes('networks')) await measureNetworks(web, codes.observer);
   if (only.includes('hands')) await measureHands(web, codes.surgeon);
   if (only.includes('watchers')) await measureWatchers(web, server, codes.observer);
+  if (only.includes('holders')) {
+    for (const hand of hands) hand.kill(); // there are 16 places for hands
+    await measureHolders(web, server, codes.surgeon);
+  }
 } finally {
   for (const child of children) child.kill('SIGKILL');
   fs.writeFileSync(`${TROCAR_WORK}/figures.json`, JSON.stringify(result, null, 1));
 }
-if (result.networks && result.hands && result.watchers && result.seeks) {
+if (result.networks && result.hands && result.watchers && result.holders && result.seeks) {
   fs.writeFileSync(`${TROCAR_WORK}/figures.md`, table());
   console.log(table());
 } else console.log(JSON.stringify(result, null, 1));

@@ -158,6 +158,50 @@ test('keys alone bring an instrument to the organ and press it', async () => {
   await close(page);
 });
 
+test('a gamepad moves, uses and changes hands, and rumbles with the force', async () => {
+  const { page, slot } = await surgeon('Pia');
+  // An object of the shape that the Gamepad API gives: the standard mapping has 4 axes and 17 buttons.
+  await page.evaluate(() => {
+    const pad = { id: 'Pad (STANDARD GAMEPAD)', index: 0, connected: true, mapping: 'standard', timestamp: 0, axes: [0, 0, 0, 0],
+      buttons: Array.from({ length: 17 }, () => ({ pressed: false, touched: false, value: 0 })), rumbles: [],
+      vibrationActuator: { playEffect: async (kind, effect) => { pad.rumbles.push([kind, effect]); return 'complete'; } } };
+    Object.assign(window, { pad });
+    navigator.getGamepads = () => [null, pad, null, null];
+  });
+  const press = (button, value = 1) => page.evaluate(([i, v]) => { window.pad.buttons[i] = { pressed: v > 0.5, touched: v > 0, value: v }; }, [button, value]);
+  const stick = (axis, value) => page.evaluate(([i, v]) => { window.pad.axes[i] = v; }, [axis, value]);
+  await stick(0, -0.8);
+  const before = await until('a tool over the organ', () => toolOf(page, slot));
+  await until('it goes to the left', async () => (await toolOf(page, slot)).tip[0] < before.tip[0] - 0.005);
+  await stick(0, 0.05);
+  await press(7, 0.9);
+  await until('a grasp', async () => (await toolOf(page, slot)).verb === 2 && (await toolOf(page, slot)).hasClaim);
+  await stick(1, -0.5);
+  await until('it pulls and rumbles', async () => Math.hypot(...(await toolOf(page, slot)).forceN) > 0.1 && await page.evaluate(() => window.pad.rumbles.length > 3));
+  await stick(1, 0);
+  const [kind, effect] = await page.evaluate(() => window.pad.rumbles.at(-1));
+  assert.equal(kind, 'dual-rumble');
+  assert.ok(effect.duration <= 250 && effect.strongMagnitude > 0 && effect.strongMagnitude <= 1);
+  await picture(page, 'hand-pad');
+  await press(7, 0);
+  await until('it lets go', async () => (await toolOf(page, slot)).verb === 0);
+  await press(6);
+  await until('it pushes', async () => (await toolOf(page, slot)).verb === 1);
+  await press(6, 0);
+  await press(4);
+  await page.locator('.tray').getByText('right hand: toothed').waitFor({ timeout: kPatience });
+  await press(5);
+  await page.locator('.tray h2', { hasText: 'Your left hand' }).waitFor({ timeout: kPatience });
+  const eye = () => page.evaluate(() => window.trocar.picture().view().eye), from = await eye();
+  await press(14);
+  await until('the view turns', async () => Math.abs((await eye())[0] - from[0]) > 0.01);
+  // A pad that is pulled out does nothing more.
+  await page.evaluate(() => { navigator.getGamepads = () => [null, null, null, null]; });
+  await until('it is forgotten', () => page.evaluate(() => window.trocar.hands().pad.name === ''));
+  assert.deepEqual(page.faults, []);
+  await close(page);
+});
+
 test('the recording of it verifies', async () => {
   world.server.kill('SIGINT');
   await world.server.ended;

@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_web.sh recording|codec|page|hands|lesson|blood|fine|debrief|access|hostile|firefox|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# run_web.sh recording|codec|page|hands|links|practice|lesson|blood|fine|debrief|access|hostile|hostile_hands|firefox|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
 # skipped, with the reason.
 set -euo pipefail
 test=$1 build=$2 work=$3
@@ -61,7 +61,7 @@ case $test in
     DISPLAY=:$(cat "$work/display") node --experimental-websocket --no-warnings --test-reporter=spec "$here/firefox.test.mjs"
     ;;
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
-  page | hands | lesson | blood | fine | debrief | access | hostile | figures)
+  page | hands | links | practice | lesson | blood | fine | debrief | access | hostile | hostile_hands | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
       skip "Chromium is not installed: deploy/setup --with-tests --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"

@@ -8,6 +8,7 @@
 #include "common/intake/acceptor.h"
 #include "common/journal/session_journal.h"
 #include "server/app/server/admission.h"
+#include "server/app/server/browser_page.h"
 #include "server/app/server/session_start.h"
 #include "server/organs/catalogue/load_organ.h"
 
@@ -65,6 +66,8 @@ Status check_start(const ServerOptions& options) {
   if (!options.metrics_address.empty())
     if (const auto s = intake::check_address(options.metrics_address, "--metrics"); !s)
       return of("metrics", s);
+  if (options.has_page)
+    if (const auto s = BrowserPage::check(options); !s) return of("browser", s);
   const char* identity = access.certificate_file.empty() ? "state" : "certificate";
   if (const auto s = Admission::check(access, options.address); !s) return of(identity, s);
   if (!options.resume_file.empty())

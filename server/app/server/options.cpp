@@ -26,6 +26,8 @@ Examples:
       the built-in liver at 127.0.0.1:7690, for programs on this machine
   trocar-server --lesson find-the-lump
       a lesson with goals and points; trocar-journal assess reads its recording
+  trocar-server --lesson find-the-lump --listen 0.0.0.0:7690 --browser
+      the same for everybody on the network: a link and a QR code for each role, for any browser
   trocar-server --organ lattice --listen 0.0.0.0:7690
       a block of springs, for everybody on the network who has one of the printed join codes
   trocar-server --listen 0.0.0.0:7690 --revoke observer
@@ -228,7 +230,7 @@ class CommandLine {
   void add_session_options();
 
   ServerOptions options_;
-  std::string listen_ = "127.0.0.1:7690", metrics_;
+  std::string listen_ = "127.0.0.1:7690", metrics_, page_;
   ResearchOptions research_;
   const CLI::Option* organ_ = nullptr;
   CLI::App app_{
@@ -265,6 +267,15 @@ void CommandLine::add_session_options() {
   app_.add_option("--listen", listen_, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
+  app_.add_flag("--browser", options_.has_page,
+                "let people take part in a browser: trocar-web beside this, and a link for each "
+                "role, on a terminal as a QR code, too")
+      ->group("Network");
+  app_.add_option("--browser-listen", page_,
+                  "where browsers reach it; port 0 takes any free one [port 7691 of --listen's "
+                  "address]")
+      ->type_name("ADDR:PORT")
+      ->group("Network");
   app_.add_flag(
           "--no-datagrams", options_.is_stream_only,
           "frames and hands over the TCP stream alone, where lost packets hold up the picture")
@@ -337,6 +348,7 @@ Status CommandLine::finish() {
   }
   if (const auto parsed = parse_listen_address(listen_, options_); !parsed) return parsed;
   if (const auto parsed = parse_metrics_address(metrics_, options_); !parsed) return parsed;
+  if (const auto parsed = parse_page_address(page_, options_); !parsed) return parsed;
   return step::validate(options_.decisions);
 }
 
@@ -344,6 +356,13 @@ Status CommandLine::finish() {
 
 Status parse_listen_address(const std::string& text, ServerOptions& options) {
   return parse_place("--listen", "127.0.0.1:7690", text, options.address, options.port);
+}
+
+Status parse_page_address(const std::string& text, ServerOptions& options) {
+  if (text.empty()) return {};
+  options.has_page = true;
+  return parse_place("--browser-listen", "0.0.0.0:7691", text, options.page_address,
+                     options.page_port);
 }
 
 Status parse_metrics_address(const std::string& text, ServerOptions& options) {

@@ -27,6 +27,9 @@ struct ServerOptions {
   bool is_stream_only = false;  // no datagrams
   std::string metrics_address;  // empty: no figures for monitoring
   std::uint16_t metrics_port = 0;
+  bool has_page = false;     // trocar-web beside it, for this session
+  std::string page_address;  // where browsers reach that; empty: as the server's own
+  std::uint16_t page_port = 7691;
   bool is_agones = false;  // a sidecar of Agones listens on this machine
   AccessOptions access;
   LimitOptions limits;
@@ -55,6 +58,8 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv);
 
 // "ADDR:PORT" or "[IPV6]:PORT"; the port may be 0 (any free one).
 Status parse_listen_address(const std::string& text, ServerOptions& options);
+// Reads --browser-listen likewise, an empty text is the server's address and port 7691.
+Status parse_page_address(const std::string& text, ServerOptions& options);
 // Reads --metrics likewise; an empty text is none.
 Status parse_metrics_address(const std::string& text, ServerOptions& options);
 

@@ -30,6 +30,7 @@
 #include "common/discovery/announcer.h"
 #include "common/secure/loopback.h"
 #include "server/app/server/admission.h"
+#include "server/app/server/browser_page.h"
 #include "server/app/server/check_start.h"
 #include "server/app/server/server_figures.h"
 #include "server/app/server/session_start.h"
@@ -69,6 +70,16 @@ std::string machine_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "this machine";
 }
 
+// Calls `then` when `is_done` holds, at the latest after `deadline`.
+void wait_for(asio::steady_timer& poll, std::function<bool()> is_done, milliseconds deadline,
+              std::function<void()> then) {
+  if (is_done() || deadline <= milliseconds::zero()) return then();
+  poll.expires_after(kPollPeriod);
+  poll.async_wait([&poll, is_done, deadline, then](boost::system::error_code error) {
+    if (!error) wait_for(poll, is_done, deadline - kPollPeriod, then);
+  });
+}
+
 class Server {
  public:
   Server(const ServerOptions& options, std::unique_ptr<Admission> admission, SessionStart start)
@@ -106,8 +117,6 @@ class Server {
   void on_signal(int signal);
   void attend();
   void begin_end();
-  // Calls `then` when `is_done` holds, at the latest after `deadline`.
-  void wait_for(std::function<bool()> is_done, milliseconds deadline, std::function<void()> then);
   void say_goodbye();
   Status finish();
   Status write_end();
@@ -128,6 +137,7 @@ class Server {
   std::unique_ptr<monitoring::FiguresServer> figures_;  // null: not asked for
   std::uint16_t sidecar_port_ = agones::kDefaultPort;
   std::unique_ptr<agones::Sidecar> sidecar_;  // null: not asked for
+  std::unique_ptr<BrowserPage> page_;         // null: not asked for
   monitoring::DiskWatch disk_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
@@ -171,12 +181,15 @@ Status Server::open() {
   tcp_ = std::move(*listening);
   connections_ = std::make_unique<crowd::GuestConnections>(*tcp_);
 
+  if (const auto issued = admission_->issue_codes(tcp_->port()); !issued) return issued;
+  auto page = BrowserPage::start(io_, options_, tcp_->port());
+  if (!page) return page.error();
+  page_ = std::move(*page);
   auto journal = open_journal(options_.journal, organ, layout, start_.continues,
                               start_.simulation.rules().bleeding, start_.key);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
-  if (const auto issued = admission_->issue_codes(tcp_->port()); !issued) return issued;
   replication::ReplicatorOptions replication;
   replication.gate = admission_->gate();
   replication.has_datagrams = tcp_->has_datagrams();
@@ -338,6 +351,7 @@ Status Server::run() {
   announce();
   watch_disk();
   std::fputs(admission_->invitation(tcp_->port()).c_str(), stdout);
+  if (page_) std::fputs(page_->links().c_str(), stdout);
   std::fflush(stdout);
   newest_ns_ = monotonic_ns();
   is_awaiting_ = options_.awaited_people > 0;
@@ -492,8 +506,9 @@ void Server::begin_end() {
   disk_timer_.cancel();
   tcp_->stop_accepting();
   replicator_->begin_barrier(loop_->report().last_frame);
-  wait_for([this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,
-           [this] { say_goodbye(); });
+  wait_for(
+      poll_, [this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,
+      [this] { say_goodbye(); });
 }
 
 // Everybody hears whether the recording got its end.
@@ -504,21 +519,14 @@ void Server::say_goodbye() {
     replicator_->set_recording(recording_state());
   }
   replicator_->end_all(replication::EndReason::ServerClosing, goodbye_);
-  wait_for([this] { return tcp_->connection_count() == 0; }, kGoodbyeDeadline,
-           [this] { io_.stop(); });
-}
-
-void Server::wait_for(std::function<bool()> is_done, milliseconds deadline,
-                      std::function<void()> then) {
-  if (is_done() || deadline <= milliseconds::zero()) return then();
-  poll_.expires_after(kPollPeriod);
-  poll_.async_wait([this, is_done, deadline, then](boost::system::error_code error) {
-    if (!error) wait_for(is_done, deadline - kPollPeriod, then);
-  });
+  wait_for(
+      poll_, [this] { return tcp_->connection_count() == 0; }, kGoodbyeDeadline,
+      [this] { io_.stop(); });
 }
 
 Status Server::finish() {
   const Status written = write_end();
+  if (page_) page_->stop();
   signals_.clear();  // which puts the default back
   ignore_ending_signals();
   // The cluster may take the machine away from here on.

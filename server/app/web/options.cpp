@@ -61,11 +61,13 @@ class CommandLine {
   Status finish();
 
  private:
+  void add_practice_options();
   void add_access_options();
   void add_limit_options();
 
   WebOptions options_;
-  std::string listen_ = "127.0.0.1:7691", metrics_;
+  std::string listen_ = "127.0.0.1:7691", metrics_, hall_ = "127.0.0.1:7694";
+  const CLI::Option* session_ = nullptr;
   std::vector<std::string> sessions_{"127.0.0.1:7690"};
   CLI::App app_{"Serves the page on which people watch sessions and recordings in a browser.",
                 "trocar-web"};
@@ -78,17 +80,20 @@ CommandLine::CommandLine() {
                                          std::to_string(kProtocolMinor))
       ->configurable(false);
   app_.get_help_ptr()->configurable(false);
-  app_.add_option("--session", sessions_,
-                  "a session that may be watched; the first one if a link "
-                  "names none; may be given several times")
-      ->type_name("HOST:PORT")
-      ->capture_default_str();
+  session_ = app_.add_option("--session", sessions_,
+                             "a session that may be watched; the first one if a link "
+                             "names none; may be given several times")
+                 ->type_name("HOST:PORT")
+                 ->capture_default_str();
   app_.add_option("--listen", listen_, "where browsers reach it; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
   app_.add_option("--public-name", options_.public_name,
                   "how links name this machine, if not by the address")
       ->type_name("HOST[:PORT]");
+  app_.add_flag("--qr", options_.draws_codes,
+                "print the links as QR codes, too, as is done on a terminal where other machines "
+                "reach the page");
   app_.add_option("--recordings", options_.recordings_folder,
                   "folder whose recordings may be watched, those named by letters, digits, ., _ "
                   "and - [none]")
@@ -105,6 +110,7 @@ CommandLine::CommandLine() {
       ->type_name("FILE");
   add_log_options(app_, options_.log_level, options_.log_format);
   add_config_options(app_, options_.checks_config, "options and files");
+  add_practice_options();
   add_access_options();
   add_limit_options();
 }
@@ -130,6 +136,31 @@ void CommandLine::add_access_options() {
       ->add_flag("--new-recordings-key", options_.makes_new_key,
                  "links to recordings from before are good no more")
       ->configurable(false);
+}
+
+void CommandLine::add_practice_options() {
+  auto& practice = options_.practice;
+  auto* group = app_.add_option_group("Practice", "a session for each visitor, of trocar-hall");
+  group
+      ->add_option("--practice", practice.offer,
+                   "what visitors practise alone, by a name of the hall's offers [nothing]")
+      ->type_name("OFFER");
+  group->add_option("--hall", hall_, "the hall, on this machine and without TLS")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  group->add_option("--hall-key", practice.key_file, "file with the hall's key")
+      ->type_name("FILE")
+      ->capture_default_str();
+  group->add_option("--practice-minutes", practice.minutes, "how long one may practise")
+      ->type_name("N")
+      ->check(command_line::whole_from_to(1, 1440))
+      ->capture_default_str();
+  group
+      ->add_option("--practice-idle", practice.idle_s,
+                   "seconds without a deed after which a session ends")
+      ->type_name("N")
+      ->check(command_line::whole_from_to(10, 86'400))
+      ->capture_default_str();
 }
 
 void CommandLine::add_limit_options() {
@@ -167,12 +198,20 @@ Status CommandLine::finish() {
       return s;
   if (options_.makes_new_key && options_.recordings_folder.empty())
     return Error{ErrorCode::Usage, "--new-recordings-key: needs --recordings, whose links it ends"};
+  auto& practice = options_.practice;
+  if (auto s = parse_place("--hall", hall_, practice.hall_host, practice.hall_port); !s) return s;
+  if (!practice.offer.empty() && !secure::is_loopback(practice.hall_host))
+    return Error{ErrorCode::Usage, "--hall: " + practice.hall_host +
+                                       " is another machine, on the way to which others could read "
+                                       "the key: run trocar-web beside the hall"};
+  // Who only practises needs no other session.
+  const bool has_sessions = practice.offer.empty() || session_->count() > 0;
   options_.sessions.clear();
   for (const auto& text : sessions_) {
     follow::SessionAddress session;
     session.name = text;
     if (auto s = parse_place("--session", text, session.host, session.port); !s) return s;
-    options_.sessions.push_back(std::move(session));
+    if (has_sessions) options_.sessions.push_back(std::move(session));
   }
   if (options_.is_insecure && !secure::is_loopback(options_.address))
     return Error{ErrorCode::Usage, "--insecure-loopback: " + options_.address +

@@ -12,6 +12,7 @@
 #include "common/base/signals.h"
 #include "common/base/text_file.h"
 #include "server/app/config/service.h"
+#include "server/app/web/links.h"
 #include "server/app/web/web_start.h"
 
 namespace trocar::app {
@@ -27,7 +28,7 @@ void end_in_order(asio::io_context& context, WebServer& server, asio::steady_tim
 Status run_web(const WebOptions& options) {
   auto start = prepare_web(options);
   if (!start) return start.error();
-  const auto key = start->content.recordings_key;
+  const auto key = start->content.recordings_key, practice_key = start->content.practice_key;
   asio::io_context context{1};
   auto listening =
       WebServer::listen(context, options, std::move(start->content), std::move(start->tls));
@@ -46,12 +47,12 @@ Status run_web(const WebOptions& options) {
       if (!error) end_in_order(context, server, last);
     });
   }
+  std::fputs(describe_links(options, server.port(), key, practice_key).c_str(), stdout);
+  std::fflush(stdout);
   if (!options.ready_file.empty())
     if (auto written = write_text_file(options.ready_file, std::to_string(server.port()) + "\n");
         !written)
       return written;
-  std::fputs(describe_links(options, server.port(), key).c_str(), stdout);
-  std::fflush(stdout);
   log::info("listening at {}:{}, Ctrl-C ends it", options.address, server.port());
   if (server.metrics_port() != 0)
     log::info("figures at {}:{}/metrics", options.metrics_address, server.metrics_port());

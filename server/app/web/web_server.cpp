@@ -10,6 +10,8 @@
 #include "common/intake/acceptor.h"
 #include "common/secure/digest.h"
 #include "common/wire/framing.h"
+#include "server/app/web/links.h"
+#include "server/app/web/practice.h"
 #include "server/app/web/recording_checks.h"
 #include "server/session/access/try_limiter.h"
 #include "server/session/monitoring/exposition.h"
@@ -26,7 +28,8 @@ constexpr std::chrono::seconds kRequestDeadline{10}, kAnswerDeadline{30};
 constexpr std::size_t kPieceBytes = 64 * 1024;
 // Old bytes wait in the kernel: few fit.
 constexpr int kSendBufferBytes = 64 * 1024;
-constexpr std::string_view kRecordingsPath = "/recordings";
+constexpr std::string_view kRecordingsPath = "/recordings", kLinksPath = "/links",
+                           kPracticePath = "/practice";
 constexpr unsigned kOk = 200, kPartialContent = 206, kNotModified = 304, kForbidden = 403,
                    kNotFound = 404, kMethodNotAllowed = 405, kRangeNotSatisfiable = 416,
                    kMisdirected = 421, kTooManyRequests = 429;
@@ -53,6 +56,7 @@ struct WebServer::Core {
   std::unique_ptr<monitoring::FiguresServer> figures;  // null: not asked for
   access::TryLimiter key_limiter;
   std::optional<RecordingChecks> checks;  // where there are recordings
+  std::shared_ptr<Practice> practice;     // null: nobody practises here
   WebCounters counters;
   const std::string machine = asio::ip::host_name();
   bool is_stopping = false;
@@ -79,6 +83,14 @@ struct WebServer::Core {
          [this] { return metrics(); }});
     if (!listening) return listening.error();
     figures = std::move(*listening);
+    return {};
+  }
+
+  Status open_practice(asio::io_context& context) {
+    if (options.practice.offer.empty()) return {};
+    auto opened = Practice::open(context, options.practice, bridge);
+    if (!opened) return opened.error();
+    practice = std::move(*opened);
     return {};
   }
 
@@ -170,6 +182,8 @@ struct WebServer::Core {
       return answer;
     }
     const auto path = request.path();
+    if (path == kPracticePath) return answer_practice(request, peer);
+    if (path == kLinksPath) return answer_links(request, peer);
     if (path == kRecordingsPath ||
         (path.starts_with(kRecordingsPath) && path[kRecordingsPath.size()] == '/'))
       return answer_recordings(request, path.substr(kRecordingsPath.size()), peer);
@@ -193,11 +207,43 @@ struct WebServer::Core {
     return answer;
   }
 
-  bool has_key(const Request& request) const {
+  // Links to a session are for who leads it, from this page and now.
+  Answer answer_links(const Request& request, const std::string& peer) {
+    auto name = std::string_view(request.target).substr(kLinksPath.size());
+    name = name.starts_with("?session=") ? name.substr(name.find('=') + 1) : "";
+    const auto* session = bridge.sessions.find(std::string(name));
+    const auto code = secure::parse_join_code(bearer_of(request));
+    if (key_limiter.seconds_to_wait(peer, monotonic_ns()) > 0 || session == nullptr || !code ||
+        !bridge.has_leader(session->name, *code)) {
+      key_limiter.record_wrong_try(peer, monotonic_ns());
+      return refuse(kForbidden, "Who leads the session has the links.\n");
+    }
+    return say(links_as_json(links_to(options, acceptor.port(), *session)));
+  }
+
+  Answer answer_practice(const Request& request, const std::string& peer) {
+    const bool is_known = practice && key_limiter.seconds_to_wait(peer, monotonic_ns()) == 0 &&
+                          secure::equal_in_constant_time(bytes_of(bearer_of(request)),
+                                                         bytes_of(content.practice_key));
+    if (!is_known) {
+      key_limiter.record_wrong_try(peer, monotonic_ns());
+      return refuse(kForbidden, "Practice needs the key of its link: ask for a new link.\n");
+    }
+    constexpr std::string_view kTicket = "?ticket=";
+    auto ticket = std::string_view(request.target).substr(kPracticePath.size());
+    ticket.remove_prefix(ticket.starts_with(kTicket) ? kTicket.size() : ticket.size());
+    return say(practice->ask(std::string(ticket), intake::counted_as(peer)));
+  }
+
+  // Empty: the request names none.
+  static std::string_view bearer_of(const Request& request) {
     constexpr std::string_view kScheme = "Bearer ";
-    auto given = request.field("Authorization");
-    if (!given.starts_with(kScheme)) return false;
-    given.remove_prefix(kScheme.size());
+    const auto given = request.field("Authorization");
+    return given.starts_with(kScheme) ? given.substr(kScheme.size()) : std::string_view();
+  }
+
+  bool has_key(const Request& request) const {
+    const auto given = bearer_of(request);
     return secure::equal_in_constant_time(bytes_of(given), bytes_of(content.recordings_key));
   }
 
@@ -286,6 +332,10 @@ struct WebServer::Core {
     text.counter("wrong_codes_total", "Wrong join codes.", number(b.wrong_codes));
     text.counter("sessions_unreachable_total", "Sessions that did not answer.",
                  number(b.unreachable));
+    text.gauge("practising", "People who practise alone now.",
+               practice ? static_cast<double>(practice->queue().practising()) : 0);
+    text.gauge("practice_waiting", "People who wait for that.",
+               practice ? static_cast<double>(practice->queue().waiting()) : 0);
     text.gauge("carriers", "Connections to sessions that many share, now.", number(b.carriers));
     text.counter("session_messages_total", "Messages from sessions.", number(sessions.messages));
     text.counter("session_bytes_total", "Bytes of these.", number(sessions.bytes));
@@ -306,6 +356,7 @@ Result<std::unique_ptr<WebServer>> WebServer::listen(asio::io_context& context,
   if (auto opened = core->acceptor.open(options.address, options.port, "--listen"); !opened)
     return opened.error();
   if (auto opened = core->open_figures(context); !opened) return opened.error();
+  if (auto opened = core->open_practice(context); !opened) return opened.error();
   return std::unique_ptr<WebServer>(new WebServer(std::move(core)));
 }
 
@@ -325,6 +376,7 @@ void WebServer::start() {
   core_->acceptor.start([core = core_](auto socket, auto peer) {
     return core->serve(std::move(socket), std::move(peer));
   });
+  if (core_->practice) core_->practice->start();
 }
 
 void WebServer::stop() {
@@ -333,6 +385,7 @@ void WebServer::stop() {
   core_->acceptor.stop();
   if (core_->figures) core_->figures->stop();
   if (core_->checks) core_->checks->stop();
+  if (core_->practice) core_->practice->stop();
   core_->acceptor.cut_all();
 }
 

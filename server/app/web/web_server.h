@@ -4,9 +4,10 @@
 //
 // Requests: GET and HEAD of the page's files, /recordings (a list), /recordings/NAME (with ranges),
 // /recordings/NAME/check (asks whether it verifies) and /recordings/NAME/checked (what is known of
-// that), and the WebSocket /session. Recordings need the key of their link. Bounds: connections in
-// all and from one address, 8 KiB of header, no body, 10 s for a request, 30 s for 64 KiB of an
-// answer.
+// that), /links?session=NAME, /practice?ticket=TICKET, and the WebSocket /session. Recordings and
+// practice need the key of their link, links the code of an instructor who is in the session from
+// here. Bounds: connections in all and from one address, 8 KiB of header, no body, 10 s for a
+// request, 30 s for 64 KiB of an answer.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -34,6 +35,7 @@ struct WebContent {
   std::optional<site::Recordings> recordings;
   std::filesystem::path state_folder;  // where there are recordings
   std::string recordings_key;  // that a request has to name; never empty where there are recordings
+  std::string practice_key;    // likewise, where people practise
 };
 
 class WebServer {

@@ -1,7 +1,5 @@
 #include "server/app/web/web_start.h"
 
-#include <fmt/format.h>
-
 #include <array>
 #include <filesystem>
 #include <utility>
@@ -13,8 +11,6 @@
 #include "common/intake/acceptor.h"
 #include "common/secure/digest.h"
 #include "common/secure/kept_identity.h"
-#include "common/secure/link_file.h"
-#include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
 
 namespace trocar::app {
@@ -23,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kKeyBytes = 16;
-constexpr const char* kKeyFile = "web-recordings.key";
+constexpr const char *kKeyFile = "web-recordings.key", *kPracticeKeyFile = "web-practice.key";
 
 Result<fs::path> state_folder(const WebOptions& options) {
   if (!options.state_folder.empty()) return fs::absolute(options.state_folder);
@@ -39,7 +35,8 @@ fs::path page_folder(const WebOptions& options) {
 }
 
 bool needs_state(const WebOptions& options) {
-  return !options.is_insecure || !options.recordings_folder.empty();
+  return !options.is_insecure || !options.recordings_folder.empty() ||
+         !options.practice.offer.empty();
 }
 
 Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs::path& state) {
@@ -49,8 +46,7 @@ Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs:
   return secure::make_server_context(kept->identity, kept->source);
 }
 
-Result<std::string> read_or_make_key(const fs::path& state, bool makes_new) {
-  const auto file = state / kKeyFile;
+Result<std::string> read_or_make_key(const fs::path& file, bool makes_new) {
   std::error_code ignored;
   if (!makes_new && fs::exists(file, ignored)) {
     auto text = secure::read_private_file(file);
@@ -79,19 +75,8 @@ Status check_state(const WebOptions& options) {
   if (options.recordings_folder.empty() || options.makes_new_key ||
       !fs::exists(*state / kKeyFile, ignored))
     return {};
-  const auto key = read_or_make_key(*state, false);
+  const auto key = read_or_make_key(*state / kKeyFile, false);
   return key ? Status() : Status(key.error());
-}
-
-std::string link_head(const WebOptions& options, std::uint16_t port) {
-  const std::string scheme = options.is_insecure ? "http://" : "https://";
-  if (!options.public_name.empty()) return scheme + options.public_name + "/";
-  const bool is_any = options.address == "0.0.0.0" || options.address == "::";
-  const bool is_ipv6 = options.address.find(':') != std::string::npos;
-  const std::string host = is_any    ? "HOST"
-                           : is_ipv6 ? "[" + options.address + "]"
-                                     : options.address;
-  return scheme + host + ":" + std::to_string(port) + "/";
 }
 
 }  // namespace
@@ -110,10 +95,15 @@ Result<WebStart> prepare_web(const WebOptions& options) {
     if (!tls) return tls.error();
     start.tls = std::move(*tls);
   }
+  if (!options.practice.offer.empty()) {
+    auto key = read_or_make_key(*state / kPracticeKeyFile, false);
+    if (!key) return key.error();
+    start.content.practice_key = std::move(*key);
+  }
   if (options.recordings_folder.empty()) return start;
   auto recordings = site::Recordings::open(options.recordings_folder);
   if (!recordings) return recordings.error();
-  auto key = read_or_make_key(*state, options.makes_new_key);
+  auto key = read_or_make_key(*state / kKeyFile, options.makes_new_key);
   if (!key) return key.error();
   if (const auto names = recordings->left_out(); !names.empty())
     log::warn(
@@ -140,26 +130,6 @@ Status check_web_start(const WebOptions& options) {
     if (const auto ready = check_writable(options.ready_file); !ready)
       return Error{ready.error().code, "--ready-file: " + ready.error().message};
   return check_state(options);
-}
-
-std::string describe_links(const WebOptions& options, std::uint16_t port,
-                           const std::string& recordings_key) {
-  const auto head = link_head(options, port);
-  std::string text = "Links for a browser:\n";
-  for (std::size_t i = 0; i < options.sessions.size(); ++i) {
-    const auto& session = options.sessions[i];
-    const std::string which = i == 0 ? "" : "&session=" + session.name;
-    for (const auto* role : {"surgeon", "assistant", "instructor", "observer"}) {
-      std::string code = "CODE";
-      if (secure::is_loopback(session.host))
-        if (const auto known = secure::read_link_file(session.port, role); known)
-          code = secure::to_text(*known);
-      text += fmt::format("  {:<10}  {}#join={}&role={}{}\n", role, head, code, role, which);
-    }
-  }
-  if (!recordings_key.empty())
-    text += fmt::format("  {:<10}  {}#recordings={}\n", "recordings", head, recordings_key);
-  return text;
 }
 
 }  // namespace trocar::app

@@ -3,8 +3,6 @@
 // Before the first browser comes, trocar-web needs the page, a certificate, the key of recordings,
 // and the folder that it serves.
 
-#include <string>
-
 #include "common/base/result.h"
 #include "common/secure/tls.h"
 #include "server/app/web/web_server.h"
@@ -20,9 +18,5 @@ struct WebStart {
 Result<WebStart> prepare_web(const WebOptions& options);
 // Says whether prepare_web() would succeed, without making anything.
 Status check_web_start(const WebOptions& options);
-// The links that people open, a line each: with the codes of sessions whose link file is on this
-// machine, else with a place for the code.
-std::string describe_links(const WebOptions& options, std::uint16_t port,
-                           const std::string& recordings_key);
 
 }  // namespace trocar::app

@@ -22,6 +22,16 @@ const SessionAddress* Sessions::find(const std::string& name) const {
   return found == known_.end() ? nullptr : &*found;
 }
 
+void Sessions::add(SessionAddress session) {
+  if (std::ranges::find(known_, session.name, &SessionAddress::name) == known_.end())
+    known_.push_back(std::move(session));
+}
+
+void Sessions::remove(const std::string& name) {
+  std::erase_if(known_, [&name](const SessionAddress& one) { return one.name == name; });
+  further_.erase(name);
+}
+
 void Sessions::note_further(const std::string& session, const secure::HalfCode& code,
                             const std::string& address) {
   const auto colon = address.rfind(':');

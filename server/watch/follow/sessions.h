@@ -26,6 +26,9 @@ class Sessions {
 
   // Empty: the first; null: there is no such session.
   const SessionAddress* find(const std::string& name) const;
+  // A session comes or goes; one that is known already stays.
+  void add(SessionAddress session);
+  void remove(const std::string& name);
   // Other addresses of a session, as its Welcome names them: they are tried when its own does not
   // answer. At most kMostFurther of a session are kept; what is no HOST:PORT is left out.
   static constexpr std::size_t kMostFurther = 8;

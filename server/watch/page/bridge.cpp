@@ -1,5 +1,7 @@
 #include "server/watch/page/bridge.h"
 
+#include <algorithm>
+
 namespace trocar::page {
 
 Bridge::Bridge(std::vector<follow::SessionAddress> known, int most_connections,
@@ -17,6 +19,25 @@ std::shared_ptr<Carrier> Bridge::carrier_of(const follow::SessionAddress& sessio
   if (is_shared) place = carrier;
   carrier->start();
   return carrier;
+}
+
+std::shared_ptr<SessionUse> Bridge::use_of(const std::string& session) {
+  auto& use = uses[session];
+  if (!use) use = std::make_shared<SessionUse>();
+  return use;
+}
+
+void Bridge::note_leader(const std::string& session, const secure::JoinCode& code) {
+  leaders_.emplace_back(session, code);
+}
+
+void Bridge::forget_leader(const std::string& session, const secure::JoinCode& code) {
+  const auto found = std::ranges::find(leaders_, std::pair(session, code));
+  if (found != leaders_.end()) leaders_.erase(found);
+}
+
+bool Bridge::has_leader(const std::string& session, const secure::JoinCode& code) const {
+  return std::ranges::find(leaders_, std::pair(session, code)) != leaders_.end();
 }
 
 }  // namespace trocar::page

@@ -6,9 +6,11 @@
 #include "common/base/asio.h"  // before Boost: see there
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/intake/room.h"
@@ -18,6 +20,12 @@
 #include "server/watch/page/page_counters.h"
 
 namespace trocar::page {
+
+// This is known of the people in a session.
+struct SessionUse {
+  int people = 0;
+  std::uint64_t deed_ns = 0;  // somebody has done something then, monotonic_ns()
+};
 
 class Bridge {
  public:
@@ -31,13 +39,21 @@ class Bridge {
   std::shared_ptr<Carrier> carrier_of(const follow::SessionAddress& session, wire::Role role,
                                       const asio::any_io_executor& executor);
 
+  // Who leads a session is in it, and has come with a code.
+  void note_leader(const std::string& session, const secure::JoinCode& code);
+  void forget_leader(const std::string& session, const secure::JoinCode& code);
+  bool has_leader(const std::string& session, const secure::JoinCode& code) const;
+
   follow::Sessions sessions;
+  std::shared_ptr<SessionUse> use_of(const std::string& session);  // made if there is none
+  std::map<std::string, std::shared_ptr<SessionUse>> uses;         // by the session's name
   intake::Room observers;
   access::TryLimiter limiter;
   PageCounters counters;
 
  private:
-  std::map<std::string, std::weak_ptr<Carrier>> carriers_;  // by the session's name
+  std::map<std::string, std::weak_ptr<Carrier>> carriers_;         // by the session's name
+  std::vector<std::pair<std::string, secure::JoinCode>> leaders_;  // by the session's name
 };
 
 }  // namespace trocar::page

@@ -4,7 +4,6 @@
 #include "common/base/spawn.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
-#include "server/watch/page/page_messages.h"
 
 namespace trocar::page {
 namespace {
@@ -36,7 +35,11 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
     is_there = co_await join(session);
     if (!is_there) co_await leave_carrier();
   }
+  const bool leads = is_there && request_.role == wire::Role::Instructor;
+  if (leads) bridge_.note_leader(session.name, request_.code);
   if (is_there) {
+    use_ = bridge_.use_of(session.name);
+    ++use_->people;
     ++bridge_.counters.watchers;
     ++bridge_.counters.joins;
     is_up_running_ = true;
@@ -51,9 +54,11 @@ asio::awaitable<void> Seat::run(const follow::SessionAddress& session) {
            "the session does not answer: try again in a moment");
   }
   co_await write_down();
+  if (leads) bridge_.forget_leader(session.name, request_.code);
   if (is_there) {
     co_await leave_carrier();
     --bridge_.counters.watchers;
+    --use_->people;
   }
 }
 
@@ -198,6 +203,7 @@ asio::awaitable<void> Seat::read_up() {
       why_ = "its page said something that a page may not say";
       break;
     }
+    if (deeds_.note(envelope)) use_->deed_ns = monotonic_ns();
     const BytesView body(message.bytes);
     const bool is_said = co_await carrier_->heed_page(number_, body);
     if (!is_said) break;

@@ -20,6 +20,7 @@
 #include "common/http/web_socket.h"
 #include "server/watch/page/bridge.h"
 #include "server/watch/page/join_request.h"
+#include "server/watch/page/page_messages.h"
 
 namespace trocar::page {
 
@@ -69,6 +70,8 @@ class Seat final : public Carried, public std::enable_shared_from_this<Seat> {
   std::size_t most_waiting_ = kMostWaitingBytes;
   asio::steady_timer news_, up_ended_;
   std::string why_;
+  std::shared_ptr<SessionUse> use_;  // of the session, once it is reached
+  Deeds deeds_;
 };
 
 }  // namespace trocar::page

@@ -39,7 +39,8 @@ asio::awaitable<void> Watcher::run() {
     const auto address = browser_->peer_address();
     log::info("{} joins from {} as {}", printable(request_.name, 64), address,
               wire::name_of(request_.role));
-    co_await watch(*session);
+    const follow::SessionAddress place = *session;  // which may go meanwhile
+    co_await watch(place);
     log::info("{} from {} has left{}{}", printable(request_.name, 64), address,
               why_.empty() ? "" : ": ", printable(why_, 200));
   }

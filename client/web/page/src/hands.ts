@@ -5,11 +5,13 @@
 //   F, Space, X               push, grasp, cut                Q and E          turn it
 //   Tab over the picture, G   the other hand                  1 to 9           another instrument
 //   I, J, K, L                up, left, down, right, for whoever has no mouse; Shift: a quarter
+//   a gamepad                 all of it: gamepad.ts
 //
 // Samples leave as often as the window's, also while nothing is drawn. A page that is hidden lets go
 // of everything, and says so: its browser would soon call it too rarely to hold anything.
 
 import { create } from '@bufbuild/protobuf';
+import { Pad, type PadState } from './gamepad';
 import { instruments } from './gen/instruments';
 import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
 import type { KeyLine } from './keys';
@@ -23,6 +25,10 @@ const kSampleMs = 8,
   kWheelPixels = 100, // a notch
   kMostSeconds = 0.1, // between two moves: a page that stood still does not jump
   kStepPixels = 160, // a second
+  kPadPixels = 400, // a second, of a stick that is fully aside
+  kPadNotches = 12, // of the wheel a second
+  kPadTurn = 1.2, // rad/s, of the view
+  kPadRoll = 0.2, // of a stick, from which it turns the instrument
   kComesMs = 300; // a tip that was elsewhere comes to where a finger, or a first click, is
 
 const indexOf = (name: string): number => instruments.findIndex(one => one.name === name);
@@ -67,6 +73,12 @@ export const handKeys: KeyLine[] = [
   { keys: 'G; Tab over the picture', does: 'the other hand' },
   { keys: '1 to 9', does: 'another instrument' },
   { keys: 'I, J, K, L', does: 'move it without a mouse; with Shift in small steps' },
+  { keys: 'Gamepad: left stick', does: 'move it' },
+  { keys: 'Gamepad: right stick', does: 'deeper, nearer; turn it' },
+  { keys: 'Gamepad: right trigger', does: 'use it: hold, cut or push' },
+  { keys: 'Gamepad: left trigger, A, B', does: 'push, grasp, cut' },
+  { keys: 'Gamepad: right bumper, left bumper', does: 'the other hand, the next instrument' },
+  { keys: 'Gamepad: cross', does: 'turn the view' },
 ];
 const kSteps: Record<string, readonly [number, number]> = {
   i: [0, -1],
@@ -108,6 +120,7 @@ export class Hands {
   private usesFromMs: number | null = null; // from then on what is pressed counts
   private readonly steps = new Set<string>(); // keys of kSteps that are held
   private readonly fingers = new Set<number>();
+  readonly pad = new Pad();
   private timer = 0;
   private lastMs = 0;
   private canvas: HTMLCanvasElement | null = null;
@@ -208,26 +221,57 @@ export class Hands {
     if (this.session.state !== 'live' || this.replica.frames === 0 || document.hidden) return;
     this.step(seconds);
     this.input.left = this.usesFromMs !== null && now >= this.usesFromMs;
-    this.replica.moveHand(this.moved, this.picture.rays().rays, this.input, seconds);
+    const pad = document.hasFocus() ? this.pad.read(now) : null,
+      input = pad ? this.withPad(pad, seconds) : this.input;
+    this.replica.moveHand(this.moved, this.picture.rays().rays, input, seconds);
     this.input.wheel = 0;
     this.hands.forEach((hand, i) => {
       hand.sample = this.replica.handSample(i, now);
       if (hand.sample?.isDue) this.session.sample(i, hand.sample);
     });
+    if (this.pad.name === '') return;
+    const own = this.replica.tools().find(tool => tool.slot === (this.own ?? -1) * 2 + this.moved);
+    this.pad.feel(own ? Math.hypot(...own.forceN) : 0, now);
   }
-  // Keys move the pointer, from the middle at first.
+  // The pad's share is added to that of mouse and keys.
+  private withPad(pad: PadState, seconds: number): HandInput {
+    const { input } = this;
+    this.hasLetGo = false;
+    for (const button of pad.began) {
+      if (button === 'otherHand') this.switchHand();
+      else this.take((this.chosen(this.moved) + 1) % instruments.length);
+    }
+    this.shift(pad.right * kPadPixels * seconds, pad.down * kPadPixels * seconds);
+    if (pad.yaw !== 0 || pad.pitch !== 0)
+      this.picture.turn(-pad.yaw * kPadTurn * seconds, pad.pitch * kPadTurn * seconds);
+    return {
+      ...input,
+      wheel: input.wheel + pad.deeper * kPadNotches * seconds,
+      left: input.left || pad.use,
+      push: input.push || pad.push,
+      grasp: input.grasp || pad.grasp,
+      cut: input.cut || pad.cut,
+      rollLeft: input.rollLeft || pad.roll < -kPadRoll,
+      rollRight: input.rollRight || pad.roll > kPadRoll,
+    };
+  }
+  // Keys move the pointer.
   private step(seconds: number): void {
     if (this.steps.size === 0) return;
+    const way = kStepPixels * seconds * (this.input.shift ? 0.25 : 1);
+    for (const key of this.steps) {
+      const [right, down] = kSteps[key] ?? [0, 0];
+      this.shift(right * way, down * way);
+    }
+  }
+  // Moves the pointer by pixels, from the middle at first.
+  private shift(right: number, down: number): void {
     const { input } = this,
       { width, height } = this.picture.rays().rays;
     if (!input.isOverScene && !this.hands[this.moved]?.sample)
       Object.assign(input, { x: width / 2, y: height / 2 });
-    const way = kStepPixels * seconds * (input.shift ? 0.25 : 1);
-    for (const key of this.steps) {
-      const [right, down] = kSteps[key] ?? [0, 0];
-      input.x = Math.max(0, Math.min(width - 1, input.x + right * way));
-      input.y = Math.max(0, Math.min(height - 1, input.y + down * way));
-    }
+    input.x = Math.max(0, Math.min(width - 1, input.x + right));
+    input.y = Math.max(0, Math.min(height - 1, input.y + down));
     input.isOverScene = true;
   }
   // While a button is held, for fingers, which have no wheel: 1 deeper, -1 nearer, 0 neither.

@@ -11,6 +11,7 @@ export interface Link {
   name: string;
   session: string; // "HOST:PORT" of one of several; empty: the first
   recordingsKey: string;
+  practiceKey: string; // empty: it is no link to practise alone
   file: string; // one of the recordings
   seconds: number | null; // where in it to begin
   view: View | null;
@@ -47,6 +48,7 @@ export function readLink(hash: string): Link {
     name: given.get('name') ?? rememberedName(),
     session: given.get('session') ?? '',
     recordingsKey: given.get('recordings') ?? '',
+    practiceKey: given.get('practice') ?? '',
     file: given.get('file') ?? '',
     seconds: Number.isFinite(seconds) && seconds >= 0 ? seconds : null,
     view: readView(given.get('view')),

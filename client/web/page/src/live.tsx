@@ -18,6 +18,7 @@ import { BloodPanel } from './blood';
 import { LessonPanel } from './goals';
 import { Marks, Pace } from './conduct';
 import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
+import { Invite } from './invite';
 import { Hands, handKeys, kFirst } from './hands';
 import { useEscape } from './keys';
 import { holdsTools, type Link } from './link';
@@ -329,6 +330,7 @@ export function Live(props: {
         {mayMark && (
           <div inert={!isLive}>
             <Door session={session} list={list.current} />
+            <Invite link={props.link} />
           </div>
         )}
         <section aria-labelledby="forces">

@@ -7,6 +7,7 @@ import './page.css';
 import { Debrief, RecordingList } from './debrief';
 import { kRoles, nameFault, readLink, rememberName, type Link, type Role } from './link';
 import { Live } from './live';
+import { Practice, whyOver } from './practice';
 import { ofFile, overHttp, Recording } from './recording';
 import { Replica } from './replica';
 import { ThemeButton } from './theme';
@@ -21,6 +22,7 @@ const kRoleText: Record<Role, string> = {
 type Where =
   | { is: 'start'; why: string }
   | { is: 'live'; link: Link }
+  | { is: 'practice'; why: string }
   | { is: 'list' }
   | { is: 'loading'; name: string }
   | { is: 'debrief'; name: string; recording: Recording };
@@ -128,7 +130,7 @@ function Page(props: { replica: Replica }): JSX.Element {
       ? link.file
         ? { is: 'loading', name: link.file }
         : { is: 'list' }
-      : { is: 'start', why: '' },
+      : { is: link.practiceKey ? 'practice' : 'start', why: '' },
   );
   const say = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
@@ -176,9 +178,24 @@ function Page(props: { replica: Replica }): JSX.Element {
           replica={props.replica}
           onEnd={why => {
             props.replica.restart();
-            setLink({ ...where.link });
-            setWhere({ is: 'start', why });
+            if (link.practiceKey)
+              void whyOver(link.practiceKey).then(over => {
+                setLink({ ...link, name: where.link.name });
+                setWhere({ is: 'practice', why: over || why });
+              });
+            else {
+              setLink({ ...where.link });
+              setWhere({ is: 'start', why });
+            }
           }}
+        />
+      );
+    case 'practice':
+      return (
+        <Practice
+          link={link}
+          why={where.why}
+          onReady={ready => setWhere({ is: 'live', link: ready })}
         />
       );
     case 'list':

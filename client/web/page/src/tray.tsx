@@ -79,6 +79,9 @@ export function Tray(props: { hands: Hands; tools: Tool[]; onDone(): void }): JS
           </button>
         ))}
       </div>
+      {hands.pad.name !== '' && (
+        <p class="how">{`Gamepad: ${hands.pad.name}. H shows its keys.`}</p>
+      )}
       <p class="how">
         Left button or one finger: use it. Right button or two fingers: the view. F push, Space
         grasp, X cut, Q and E turn. Without a mouse: I, J, K and L move it.
