@@ -1,7 +1,7 @@
 #pragma once
 
-// A client talks over one connection to its server after the other: Hello and pings out, messages in,
-// datagrams beside them. Thread: the Asio thread.
+// A client talks over one connection to its server after the other: Hello and pings out, messages
+// in, datagrams beside them. Thread: the Asio thread.
 //
 //   begin() -> read(), which returns when the connection has ended -> cut() -> await_end() -> ...
 
