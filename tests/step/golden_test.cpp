@@ -106,25 +106,25 @@ TEST(Golden, TensorMass) {
   expect_golden(two_hands(liver(TensorMass), 13482936766529168765u));
 }
 TEST(Golden, NeoHookean) {
-  expect_golden(two_hands(liver(NeoHookean), 16220074580014713771u));
+  expect_golden(two_hands(liver(NeoHookean), 6410652154079730806u));
 }
 TEST(Golden, NeoHookeanAveraged) {
-  expect_golden(two_hands(liver(NeoHookean, true), 10915428290445618158u));
+  expect_golden(two_hands(liver(NeoHookean, true), 14611346558769100806u));
 }
 TEST(Golden, MeasuredPolynomial) {
-  expect_golden(two_hands(measured_liver(StrainEnergy::ReducedPolynomial), 6380920995361086907u));
+  expect_golden(two_hands(measured_liver(StrainEnergy::ReducedPolynomial), 2127443522369678599u));
 }
 TEST(Golden, MeasuredPolynomialAveraged) {
   expect_golden(
-      two_hands(measured_liver(StrainEnergy::ReducedPolynomial, true), 1568247907652819972u));
+      two_hands(measured_liver(StrainEnergy::ReducedPolynomial, true), 16144056562195544373u));
 }
 TEST(Golden, MeasuredExponential) {
-  expect_golden(two_hands(measured_liver(StrainEnergy::Exponential), 2865049263673562965u));
+  expect_golden(two_hands(measured_liver(StrainEnergy::Exponential), 15630492249659452894u));
 }
 
 // The default of the programs, with what has relaxed.
 TEST(Golden, BuiltInMeasuredLiver) {
-  auto golden = two_hands(*catalogue::make_measured_liver(3000), 17258191170181832732u);
+  auto golden = two_hands(*catalogue::make_measured_liver(3000), 14372108634978367576u);
   golden.has_happened = [](const Simulation& simulation, const TickReport& report) {
     return report.contact.nodes > 0 && !simulation.state().world.relaxation.is_empty();
   };
@@ -179,7 +179,7 @@ TEST(Golden, Tear) {
        .hands = hand,
        .has_happened = [](const Simulation&,
                           const TickReport& report) { return report.cut.torn_area_m2 > 0; },
-       .hash = 14146643922622343531u});
+       .hash = 114239061080965104u});
 }
 
 // Two flat tools squeeze a hinged pair of flaps until they touch each other.
@@ -209,7 +209,7 @@ TEST(Golden, SelfContact) {
                      [](const Simulation& simulation, const TickReport&) {
                        return simulation.state().self_contacts.nodes().size() > 20;
                      },
-                 .hash = 12966586245631378226u});
+                 .hash = 15761452666596921661u});
 }
 
 }  // namespace

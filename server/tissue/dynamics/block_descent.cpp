@@ -119,10 +119,7 @@ void BlockDescent::read_state(const world::World& world) {
     }
   }
   read_motion(world);
-  if (linear_far_field_) {
-    linear_far_field_->read_state(x_.data(), world);
-    quiet_.moved_all();
-  }
+  if (linear_far_field_) linear_far_field_->read_state(x_.data(), world);
   read_relaxation(world);
 }
 
@@ -138,7 +135,6 @@ void BlockDescent::read_motion(const world::World& world) {
 void BlockDescent::use_linear_far_field(const world::World& world) {
   linear_far_field_ = std::make_unique<LinearFarField>(tissue_, world);
   linear_far_field_->read_state(x_.data(), world);
-  for (const auto g : all_groups_) quiet_.index(g, linear_far_field_->linear());
   scratch_.resize(workers_.most());
   due_.reserve(all_groups_.size());
 }
@@ -157,7 +153,6 @@ void BlockDescent::read_state(const world::World& world, std::span<const NodeInd
     const Slot slot = tissue_.groups().slot_of(node);
     x_[slot] = to_float4(world.displacements[node.value]);
     v_[slot] = to_float4(world.velocities[node.value]);
-    if (linear_far_field_) quiet_.moved(slot / kLanes);
     auto& free = free_[slot / kLanes];
     const unsigned lane = slot % kLanes;
     free =
@@ -274,9 +269,7 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads,
   for (const auto node : loads.held)
     ask_energies(tissue_.groups().slot_of(node) / kLanes, x_.data());
   if (has_explicit_strain_)
-    for_each_group(all_groups_, [&](Group g) {
-      if (!is_far_linear_ || !quiet_.keeps(g)) tissue_.update_nodal_stress(g, x_.data());
-    });
+    for_each_group(all_groups_, [&](Group g) { tissue_.update_nodal_stress(g, x_.data()); });
   for_each_group(begun_.groups, [&](Group g) { begin_inertia(g, loads.forces); });
   place_held(loads);
   if (is_far_linear_)
@@ -578,7 +571,6 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     report.nodes_restored = restored.nodes;
     report.largest_move_m += restored.largest_move_m;
     restart_nodal_strain();
-    if (linear_far_field_) quiet_.moved_all();
   }
   end_relaxation(world, loads.held);
   report.residual_n = note_residuals(near);

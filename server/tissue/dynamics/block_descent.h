@@ -26,7 +26,6 @@
 #include "server/tissue/dynamics/far_plan.h"
 #include "server/tissue/dynamics/lane_packs.h"
 #include "server/tissue/dynamics/linear_far_field.h"
-#include "server/tissue/dynamics/quiet_groups.h"
 #include "server/tissue/dynamics/sweep_plan.h"
 #include "server/tissue/dynamics/tissue.h"
 #include "server/tissue/world/world.h"
@@ -53,10 +52,6 @@ struct SolveSettings {
   // Far nodes are swept in every so many steps, one group of eight after another, each then for all
   // the time since; in between they coast. Solve once per world.tick, then.
   std::uint32_t far_interval = 1;
-  // With a linear far field: far nodes that are slower than this, as those around them, are swept
-  // in one tick of eight and pause in the others (QuietGroups); 0: never. Solve once per
-  // world.tick, then.
-  float quiet_m_s = 0;
   // Far nodes are linear about a pose of not long ago (LinearFarField), after
   // use_linear_far_field().
   bool has_linear_far_field = false;
@@ -178,8 +173,6 @@ class BlockDescent {
 
   void plan_step(std::span<const NodeIndex> near, const SolveSettings& settings, Tick tick,
                  const ExternalLoads& loads);
-  void find_quiet(const SolveSettings& settings, Tick tick);
-  bool pauses(Group group) const { return is_far_linear_ && quiet_.pauses(group); }
   void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
   void plan_packs(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
   void plan_last_sweep(const SolveSettings& settings);
@@ -282,10 +275,8 @@ class BlockDescent {
   SweepPlan last_;       // the last sweep: of near_ and far_swept_
   std::unique_ptr<LinearFarField> linear_far_field_;  // null: not used
   bool is_far_linear_ = false;                        // in this step
-  QuietGroups quiet_;                                 // while there is a linear far field
   std::vector<std::uint8_t> has_energies_;            // per group: see use_energies()
   std::vector<Group> groups_with_energies_;           // of these
-  std::vector<std::uint8_t> in_use_;                  // per group: may not pause in this step
   std::span<const NodeIndex> springing_;              // see let_spring()
   std::uint32_t far_interval_ = 1;                    // of this step
   float inverse_dt_ = 0;                              // of this step

@@ -12,21 +12,11 @@ namespace {
 // Far groups next to one another take turns together, so that memory is read in runs.
 constexpr std::uint32_t kPhaseGroups = 16;
 constexpr std::uint32_t kFewSweeps = 3;
-constexpr Tick kQuietInterval = 8;
 // Near nodes are packed where their groups have so many times as many lanes.
 constexpr std::uint64_t kSparseGroups = 2;
 constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
 
 }  // namespace
-
-// Once in kQuietInterval ticks everything is swept. The motion of free pieces is put right in each.
-void BlockDescent::find_quiet(const SolveSettings& settings, Tick tick) {
-  quiet_.begin_step();
-  if (!is_far_linear_ || !(settings.quiet_m_s > 0) || tick % kQuietInterval == 0) return;
-  in_use_.assign(has_energies_.begin(), has_energies_.end());
-  for (const auto node : springing_) in_use_[tissue_.groups().slot_of(node) / kLanes] = 1;
-  quiet_.find(settings.quiet_m_s, free_, near_.lanes, in_use_, v_.data());
-}
 
 void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSettings& settings,
                              Tick tick, const ExternalLoads& loads) {
@@ -36,11 +26,9 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSetting
     for (auto* plan : {&band.nodes, &band.kept, &band.packed}) plan->clear();
   for (const auto node : near) near_.add(groups, node);
   near_.finish(groups);
-  find_quiet(settings, tick);
   far_interval_ = settings.far_interval;
   if (settings.far_sweeps > 0)
     for (Group g = 0; g < free_.size(); ++g) {
-      if (pauses(g)) continue;
       const auto lanes = static_cast<std::uint8_t>(free_[g] & ~near_.lanes[g]);
       far_.add(g, lanes);
       if (!is_slow(g) || (g / kPhaseGroups + tick) % far_interval_ == 0) far_swept_.add(g, lanes);
@@ -51,8 +39,7 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSetting
       cut_swept_.add(g, static_cast<std::uint8_t>(far_swept_.lanes[g] & cut_[g]));
   cut_swept_.finish(groups);
   for (const auto g : near_.groups) begun_.add(g, 0xff);
-  for (const auto g : is_far_linear_ ? all_groups_ : far_.groups)
-    if (!is_far_linear_ || !quiet_.stands(g)) begun_.add(g, 0xff);
+  for (const auto g : is_far_linear_ ? all_groups_ : far_.groups) begun_.add(g, 0xff);
   for (const auto node : loads.held) begun_.add(groups.slot_of(node) / kLanes, 0xff);
   for (const auto g : begun_.groups) begun_stamp_[g] = current_;
   // A node that is held along an axis is asked for its force by its group.

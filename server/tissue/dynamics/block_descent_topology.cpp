@@ -58,12 +58,7 @@ UpdateReport BlockDescent::update_topology(const topology::Topology& topology,
   for (const auto lanes : tissue_.rebuilt())
     for (std::uint32_t lane = 0; lane < kLanes; ++lane)
       if (lanes.has(lane)) packs_.remove(lanes.group * kLanes + lane);
-  if (linear_far_field_) {
-    linear_far_field_->update_topology(x_.data(), world);
-    for (const auto lanes : tissue_.rebuilt())
-      quiet_.index(lanes.group, linear_far_field_->linear());
-    for (const auto lanes : tissue_.touched()) quiet_.moved(lanes.group);
-  }
+  if (linear_far_field_) linear_far_field_->update_topology(x_.data(), world);
   due_.reserve(groups.group_count());
   return report;
 }

@@ -55,9 +55,6 @@ class LinearFarField {
 
   void after_move(const SlotLanes& slots, std::uint8_t lanes, const Vec8& dx, float inverse_dt);
 
-  // Neighbours are those of its rows.
-  const Linearisation& linear() const { return linear_; }
-
   float damping_time_s() const { return damping_time_s_; }
 
  private:

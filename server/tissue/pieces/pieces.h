@@ -40,9 +40,8 @@ inline constexpr double kShape_m_s = 5e-4;
 // Calm tissue is untouched, with a mean square of speeds below that of kCalm_m_s. What was cut, and
 // was calm for so long, is at rest, too, while it trembles about its place: from one pose of the
 // far field to the next by kTremble_m (root mean square) and nowhere by kFlutter_m. It must not
-// creep: on the whole by kRest_m_s, and no node by kShape_m_s. What pauses creeps slowly at first,
-// so that calm lasts for some poses.
-inline constexpr std::uint16_t kCalmTicks = 4 * world::FarPoses::kInterval;
+// creep: on the whole by kRest_m_s, and no node by kShape_m_s.
+inline constexpr std::uint16_t kCalmTicks = 2 * world::FarPoses::kInterval;
 inline constexpr double kCalm_m_s = 1e-3, kTremble_m = 1e-5, kFlutter_m = 2e-4;
 inline constexpr double kFloor_m = 0.3, kFarthest_m = 0.9;
 

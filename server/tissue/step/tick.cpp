@@ -113,16 +113,13 @@ LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::Prop
 // and tangles stay unless all that pulls at them is swept as often.
 constexpr std::uint32_t kRestSweeps = 4, kCutSweeps = 2;
 constexpr Tick kRestsAfter = 256;  // from what a blade did last in tissue
-// Tissue that no tool touches pauses where it is slower than this: recovery from a press soon is. A
-// tool would feel it as mass, and what is cut under tension would shake for longer.
-constexpr float kQuiet_m_s = 2e-3f;
 
 void sweep_until_rest(bool is_being_cut, bool has_tension, dynamics::SolveSettings& settings) {
   const auto least = is_being_cut && !has_tension ? kCutSweeps : kRestSweeps;
   settings.sweeps = std::max(settings.sweeps, least);
   if (has_tension) settings.far_sweeps = std::max(settings.far_sweeps, least);
   settings.cut_sweeps = least;
-  if (!is_being_cut || has_tension) settings.bands = {};
+  settings.bands = {};
 }
 
 // The solver is told this for one step of time.
@@ -191,7 +188,6 @@ SolveReport solve(const contact::ContactList& contacts, bool may_rest,
   const bool has_untouched_wounds = contacts.tools.empty() && !world.origins.empty();
   if (may_rest && has_untouched_wounds && !(settings.residual_tolerance_n > 0))
     sweep_until_rest(world.tick < state.cuts.last_work() + kRestsAfter, work.has_tension, settings);
-  if (may_rest && contacts.tools.empty() && !work.has_tension) settings.quiet_m_s = kQuiet_m_s;
   auto report = solve_steps(contacts, nodes, settings, decisions.policy.steps_per_tick, loads,
                             world, work.solver);
   const auto settled =
