@@ -7,7 +7,8 @@
 #   style    the README keeps 150 lines, paragraphs keep 90 words, pictures keep 150 kB
 #   options  docs/programs.md has exactly the options that the programs' --help has, and no page names
 #            an option that no program or script has
-#   keys     docs/scripts-and-scenarios.md has exactly the keys that the sources read
+#   keys     docs/scripts-and-scenarios.md and docs/thread.md have exactly the keys that the sources
+#            read
 #
 # Each fault is one line on stdout; the exit code is 1 if there is any. What --help says is asked once.
 set -uo pipefail
@@ -174,7 +175,7 @@ readers=(server/lab/scenario/*.cpp common/tool/script*.cpp)
 # Keys in the first or, below '| table | key', second cells of the tables.
 documented_keys() {
   awk -F'|' '/^\| table \| key/ {c = 3; next} /^\| key in|^\| key \|/ {c = 2; next} /^$/ {c = 0}
-    c && /^\|/ {print $c}' docs/scripts-and-scenarios.md | grep -oE '`[a-z0-9_]+`' | tr -d '`' | sort -u
+    c && /^\|/ {print $c}' docs/scripts-and-scenarios.md docs/thread.md | grep -oE '`[a-z0-9_]+`' | tr -d '`' | sort -u
 }
 read_keys() {
   {
@@ -189,10 +190,10 @@ check_keys() {
   local key
   while read -r key; do
     grep -qF "\"$key\"" "${readers[@]}" server/organs/material/*.h ||
-      fault "docs/scripts-and-scenarios.md: has the key $key, which nothing reads"
+      fault "docs/scripts-and-scenarios.md or docs/thread.md: has the key $key, which nothing reads"
   done < <(documented_keys)
   while read -r key; do
-    fault "docs/scripts-and-scenarios.md: does not have the key $key, which is read"
+    fault "docs/scripts-and-scenarios.md, docs/thread.md: neither has the key $key, which is read"
   done < <(comm -13 <(documented_keys) <(read_keys))
   [ "$(documented_keys | wc -l)" -ge 60 ] || fault "docs/scripts-and-scenarios.md: fewer than 60 keys were found"
 }

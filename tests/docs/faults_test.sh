@@ -44,7 +44,7 @@ expect() {
 expect links 'link to nowhere.md: there is no such file' 'docs/limits.md has no such heading' \
   'names server/nowhere/at_all.cpp' 'names Coupling::Nowhere, which no source has' 'no page leads to docs/alone.md'
 expect style 'allowed are 150' 'a paragraph of 91 words' 'large.jpg: has 150001 bytes'
-expect keys 'does not have the key fibre_direction' 'has the key fiber_direction, which nothing reads'
+expect keys 'neither has the key fibre_direction' 'has the key fiber_direction, which nothing reads'
 expect options "'## trocar-server' does not have --organ" \
   "'## trocar-server' has --orgn, which trocar-server does not have" \
   'docs/limits.md: names --no-such-option'

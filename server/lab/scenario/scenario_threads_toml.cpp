@@ -25,20 +25,23 @@ std::optional<Vec3d> read_limited(tool::TableReader& reader, const std::string& 
   return value;
 }
 
-thread::End read_end(tool::TableReader& reader, const std::string& which) {
+struct EndKeys {
+  std::string held, load, velocity, until;
+};
+
+thread::End read_end(tool::TableReader& reader, const EndKeys& keys) {
   thread::End end;
-  end.is_held = reader.boolean(which + "_held").value_or(false);
-  const auto load = read_limited(reader, which + "_load_n", kMostLoad_n, "N");
-  const auto velocity = read_limited(reader, which + "_velocity_mm_s", kMostSpeed_mm_s, "mm/s");
-  if (load && end.is_held)
-    reader.fail(which + "_load_n", "is of a free end, remove it or " + which + "_held");
+  end.is_held = reader.boolean(keys.held).value_or(false);
+  const auto load = read_limited(reader, keys.load, kMostLoad_n, "N");
+  const auto velocity = read_limited(reader, keys.velocity, kMostSpeed_mm_s, "mm/s");
+  if (load && end.is_held) reader.fail(keys.load, "is of a free end, remove it or " + keys.held);
   if (velocity && !end.is_held)
-    reader.fail(which + "_velocity_mm_s", "is of a held end, write " + which + "_held = true");
+    reader.fail(keys.velocity, "is of a held end, write " + keys.held + " = true");
   end.load_n = load.value_or(Vec3d{});
   end.velocity_m_s = velocity.value_or(Vec3d{}) * 1e-3;
-  const auto until = reader.number(which + "_until_s", 0, kMostSeconds);
+  const auto until = reader.number(keys.until, 0, kMostSeconds);
   if (until && !load && !velocity)
-    reader.fail(which + "_until_s", "needs " + which + "_load_n or " + which + "_velocity_mm_s");
+    reader.fail(keys.until, "needs " + keys.load + " or " + keys.velocity);
   end.until_s = until.value_or(velocity ? kMostSeconds : 0);
   return end;
 }
@@ -63,8 +66,9 @@ thread::ThreadRule read_thread(tool::Document& document, tool::TableReader& read
                            {{{"2-0", Size::Usp2_0}, {"3-0", Size::Usp3_0}, {"4-0", Size::Usp4_0}}})
           .value_or(Size::Usp3_0);
   rule.self_friction = reader.number("self_friction", 0, 1);
-  rule.start = read_end(reader, "start");
-  rule.end = read_end(reader, "end");
+  rule.start =
+      read_end(reader, {"start_held", "start_load_n", "start_velocity_mm_s", "start_until_s"});
+  rule.end = read_end(reader, {"end_held", "end_load_n", "end_velocity_mm_s", "end_until_s"});
   const auto points = reader.tables("point");
   if (points.size() < 2)
     reader.fail_missing("point", "write two or more [[thread.point]] with at_mm");

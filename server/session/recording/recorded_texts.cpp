@@ -29,6 +29,7 @@ constexpr RecordedText kTexts[] = {
     {"trocar.proto.LessonStage.text", TextKind::Harmless},
     {"trocar.proto.LessonStage.title", TextKind::Harmless},
     {"trocar.proto.LessonText.source", TextKind::Harmless},
+    {"trocar.proto.MaterialRegion.look", TextKind::Harmless},
     {"trocar.proto.MaterialRegion.name", TextKind::Harmless},
     {"trocar.proto.MeasuredMaterial.name", TextKind::Harmless},
     {"trocar.proto.Organ.name", TextKind::Harmless},
@@ -40,6 +41,7 @@ constexpr RecordedText kTexts[] = {
     {"trocar.proto.SurfaceChange.region", TextKind::Harmless},
     {"trocar.proto.SurfaceTopology.organ_name", TextKind::Harmless},
     {"trocar.proto.TeachEvent.text", TextKind::Teaching},
+    {"trocar.proto.TieBand.name", TextKind::Harmless},
 };
 
 bool tells(const Descriptor& message, std::set<const Descriptor*>& seen) {
