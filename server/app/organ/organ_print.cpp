@@ -87,7 +87,7 @@ void print_materials(const organ::Organ& organ) {
     std::printf("  directed fibres     at %s nodes\n", grouped(nodes_with_fibres(organ)).c_str());
   for (const auto& region : organ.regions) {
     std::printf("  region              %s, %s nodes%s%s:\n", region.name.c_str(),
-                grouped(region.nodes.size()).c_str(), region.look.empty() ? "" : ", drawn as ",
+                grouped(region.nodes.size()).c_str(), region.look.empty() ? "" : ", look ",
                 region.look.c_str());
     print_material(region.material);
   }
