@@ -94,9 +94,6 @@ Status Told::take(const proto::Envelope& message, std::uint64_t arrival_ns) {
     case proto::Envelope::kLessonProgress:
       apply(message.lesson_progress());
       return {};
-    case proto::Envelope::kGoodbye:
-      goodbye_text_ = message.goodbye().text();
-      return {};
     default:
       return {};
   }

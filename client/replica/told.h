@@ -62,7 +62,6 @@ class Told {
   const std::optional<LedView>& led_view() const { return led_view_; }
   // Returns what the server last said of its recording.
   const wire::RecordingState& recording() const { return recording_; }
-  const std::string& goodbye_text() const { return goodbye_text_; }
 
  private:
   Status apply(const proto::Participants& message);
@@ -93,7 +92,6 @@ class Told {
   std::vector<std::string> marks_;
   std::optional<LessonView> lesson_;
   std::size_t lesson_strokes_ = 0;  // of strokes_, the first ones: the line of a stage
-  std::string goodbye_text_;
 };
 
 }  // namespace trocar::replica

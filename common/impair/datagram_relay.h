@@ -22,7 +22,6 @@ class DatagramRelay : public std::enable_shared_from_this<DatagramRelay> {
 
   void start();
   void close();
-  std::size_t peer_count() const { return peers_.size(); }
 
  private:
   struct Peer;

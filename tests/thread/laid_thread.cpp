@@ -156,6 +156,25 @@ Rules around_peg(double angle, double friction, double radius_m, double load_n, 
   return rules;
 }
 
+double strain_at_a_jerk() {
+  std::vector<Vec3d> path;
+  for (int i = 0; i <= 300; ++i) {
+    const double angle = kPi * i / 300;
+    path.push_back({0.0955 * std::cos(angle), -0.0955 * std::sin(angle), 0});
+  }
+  auto rules = rules_of(silk_along(path));
+  rules.gravity_m_s2 = {0, -9.81, 0};
+  rules.threads[0].start.is_held = true;
+  rules.threads[0].end = {.is_held = true, .velocity_m_s = {0, 0, 1}, .until_s = 0.1};
+  LaidThread laid(rules);
+  double largest = 0;
+  for (int k = 0; k < 600; ++k) {
+    laid.tick();
+    largest = std::max(largest, laid.largest_strain());
+  }
+  return largest;
+}
+
 KnotInHands::KnotInHands(const std::vector<Throw>& throws, double self_friction)
     : laid(knot_rules(throws, self_friction)) {
   for (int k = 0; k < 150; ++k) {

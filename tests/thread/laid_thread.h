@@ -41,6 +41,10 @@ ToolNow jaws_at(const Vec3d& tip_m, const Vec3d& shaft);
 // tangent, is held.
 Rules around_peg(double angle, double friction, double radius_m, double load_n, double speed);
 
+// Returns the largest strain of a slack thread, half a circle between two hands, one of which goes
+// off at 1 m/s and stops.
+double strain_at_a_jerk();
+
 // A throw: half turns of one strand about the other, 3 or 5, by one hand or the other.
 struct Throw {
   int half_turns = 3, hand = 1;

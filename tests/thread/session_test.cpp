@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/tissue/step/simulation.h"
 #include "server/tissue/step/thread_stage.h"
@@ -74,6 +76,32 @@ TEST(ThreadInTheTick, ADamagedSnapshotIsRefused) {
     const BytesView less(bytes.data(), bytes.size() - cut);
     EXPECT_FALSE(one.simulation.restore_snapshot(less).ok()) << cut;
   }
+}
+
+// Whatever of it is no number, or no place on a segment.
+TEST(ThreadInTheTick, ASnapshotOfWhatCannotBeIsRefused) {
+  const auto is_read = [](auto&& change) {
+    LiftedThread lifted;
+    lifted.run(250);
+    Threads threads = lifted.threads();
+    threads.pairs = {{0}, {9}, {0.5}, {0.5}, {1}, {Vec3d{}}};
+    change(threads);
+    Bytes bytes;
+    auto writing = world::StateArchive::writing(bytes);
+    threads.visit_state(writing);
+    Threads read = lifted.threads();
+    auto reading = world::StateArchive::reading(bytes);
+    read.visit_state(reading);
+    return reading.ok();
+  };
+  EXPECT_TRUE(is_read([](Threads&) {}));
+  EXPECT_FALSE(is_read([](Threads& now) { now.places_m[3].x = NAN; }));
+  EXPECT_FALSE(is_read([](Threads& now) { now.creeps_m[3].y = NAN; }));
+  EXPECT_FALSE(is_read([](Threads& now) { now.tensions_n[3] = NAN; }));
+  EXPECT_FALSE(is_read([](Threads& now) { now.holds.offsets_m[0].z = INFINITY; }));
+  EXPECT_FALSE(is_read([](Threads& now) { now.pairs.place_first[0] = 2; }));
+  EXPECT_FALSE(is_read([](Threads& now) { now.pairs.press_n[0] = NAN; }));
+  EXPECT_FALSE(is_read([](Threads& now) { now.pairs.second[0] = 1'000'000; }));
 }
 
 TEST(ThreadInTheTick, AMarkBringsItBackAndNobodyHoldsIt) {

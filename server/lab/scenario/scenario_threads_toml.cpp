@@ -5,14 +5,11 @@
 namespace trocar::scenario {
 namespace {
 
-constexpr double kMost_mm = 2000, kMostSpeed_mm_s = 5000, kMostLoad_n = 50, kMostSeconds = 1e6;
-constexpr double kMostPegRadius_mm = 1000;
-
 Vec3d read_near(tool::TableReader& reader, std::string_view key) {
   const auto mm = reader.vector(key);
   if (!mm)
     reader.fail_missing(key, "write [x, y, z]");
-  else if (length(*mm) > kMost_mm)
+  else if (length(*mm) > thread::kMostM * 1e3)
     reader.fail(key, "is more than 2 m away: is it in millimetres?");
   return mm.value_or(Vec3d{}) * 1e-3;
 }
@@ -32,17 +29,17 @@ struct EndKeys {
 thread::End read_end(tool::TableReader& reader, const EndKeys& keys) {
   thread::End end;
   end.is_held = reader.boolean(keys.held).value_or(false);
-  const auto load = read_limited(reader, keys.load, kMostLoad_n, "N");
-  const auto velocity = read_limited(reader, keys.velocity, kMostSpeed_mm_s, "mm/s");
+  const auto load = read_limited(reader, keys.load, thread::kMostLoadN, "N");
+  const auto velocity = read_limited(reader, keys.velocity, thread::kMostSpeedM_s * 1e3, "mm/s");
   if (load && end.is_held) reader.fail(keys.load, "is of a free end, remove it or " + keys.held);
   if (velocity && !end.is_held)
     reader.fail(keys.velocity, "is of a held end, write " + keys.held + " = true");
   end.load_n = load.value_or(Vec3d{});
   end.velocity_m_s = velocity.value_or(Vec3d{}) * 1e-3;
-  const auto until = reader.number(keys.until, 0, kMostSeconds);
+  const auto until = reader.number(keys.until, 0, thread::kMostSeconds);
   if (until && !load && !velocity)
     reader.fail(keys.until, "needs " + keys.load + " or " + keys.velocity);
-  end.until_s = until.value_or(velocity ? kMostSeconds : 0);
+  end.until_s = until.value_or(velocity ? thread::kMostSeconds : 0);
   return end;
 }
 
@@ -85,7 +82,8 @@ thread::Peg read_peg(tool::TableReader& reader) {
   thread::Peg peg;
   peg.from_m = read_near(reader, "from_mm");
   peg.to_m = read_near(reader, "to_mm");
-  const auto radius = reader.number("radius_mm", thread::kLeastPegRadiusM * 1e3, kMostPegRadius_mm);
+  const auto radius =
+      reader.number("radius_mm", thread::kLeastPegRadiusM * 1e3, thread::kMostPegRadiusM * 1e3);
   if (radius) peg.radius_m = *radius * 1e-3;
   peg.friction = reader.number("friction", 0, 2).value_or(peg.friction);
   reader.finish();
@@ -108,7 +106,7 @@ std::optional<thread::Rules> read_threads(tool::Document& document, tool::TableR
   }
   if (const auto* table = root.table("floor"); table != nullptr && document.ok()) {
     tool::TableReader reader(document, *table, "floor");
-    const auto y_mm = reader.number("y_mm", -kMost_mm, kMost_mm);
+    const auto y_mm = reader.number("y_mm", -thread::kMostM * 1e3, thread::kMostM * 1e3);
     if (!y_mm) reader.fail_missing("y_mm", "write how high it is, such as -50");
     rules.floor_y_m = y_mm.value_or(0) * 1e-3;
     reader.finish();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "server/organs/catalogue/five_tets.h"
 #include "server/organs/catalogue/lay_ties.h"
@@ -45,7 +46,7 @@ Result<mesh::TetMesh> ellipsoid_mesh(const Vec3d& size_m, int nodes) {
     const double k = length(scaled), steep = length(slope);
     return steep > 0 ? k * (k - 1) / steep : -std::min({r.x, r.y, r.z});
   };
-  constexpr double kPi = 3.14159265358979323846;
+  constexpr double kPi = std::numbers::pi;
   auto filled = mesh::fill_field(distance, {-r, r}, 4.0 / 3 * kPi * r.x * r.y * r.z,
                                  4.0 / 3 * kPi * (r.x * r.y + r.y * r.z + r.z * r.x), nodes);
   if (!filled) return filled.error();

@@ -24,7 +24,6 @@ class GmshMesh {
  public:
   explicit GmshMesh(TextReader& reader) : in_(reader) {}
 
-  bool has_nodes() const { return has_nodes_; }
   Status begin_nodes();
   Status add_node(std::int64_t id, const Vec3d& position);
   Status end_nodes();  // needed before the first element

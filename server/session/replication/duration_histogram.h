@@ -14,14 +14,10 @@ class DurationHistogram {
   void add(std::uint64_t ns) {
     ++buckets_[bucket_of(ns)];
     ++count_;
-    total_ns_ += ns;
   }
   void clear() { *this = {}; }
 
   std::uint64_t count() const { return count_; }
-  double mean_us() const {
-    return count_ ? static_cast<double>(total_ns_) / static_cast<double>(count_) / 1e3 : 0.0;
-  }
   // Smallest duration that at least `share` of all are not above; 0 when empty.
   double quantile_us(double share) const {
     const double wanted = share * static_cast<double>(count_);
@@ -54,7 +50,6 @@ class DurationHistogram {
 
   std::array<std::uint32_t, kBuckets> buckets_{};
   std::uint64_t count_ = 0;
-  std::uint64_t total_ns_ = 0;
 };
 
 }  // namespace trocar::replication

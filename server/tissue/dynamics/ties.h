@@ -5,10 +5,10 @@
 // With r from one end to the other, l = |r|, d = l - rest length, A the area and m the larger of d
 // and the largest extension so far, the tension is s = A stress(m) d/m along r, and nothing where
 // d <= 0. It is the exact derivative of a potential in d as long as the memory stands, which the
-// tick moves on at its end (step/ties.h). The block has the secant k = A stress(m)/m in place of
-// the derivative, so that it stays positive while a tie weakens: w^2 k (d/l I + rest/l u u^T) for
-// a node with the weight w. Two ends in one place have no direction between them: that tie is
-// silent.
+// tick moves on after the solve (server/tissue/step/tie_breaks.h). The block has the secant k = A
+// stress(m)/m in place of the derivative, so that it stays positive while a tie weakens: w^2 k (d/l
+// I + rest/l u u^T) for a node with the weight w. Two ends in one place have no direction between
+// them: that tie is silent.
 //
 // A tie has no linear form: nodes at which one meets have no linear far field.
 

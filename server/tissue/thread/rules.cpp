@@ -8,8 +8,6 @@ namespace {
 constexpr double kFineM = kSegmentM / 4;
 constexpr int kSmoothings = 40;  // rounds corners to about 1.5 mm
 constexpr double kMostInsideM = 0.05e-3;
-constexpr double kMostM = 2;
-constexpr double kMostLoadN = 50, kMostSpeed = 5;
 
 // Points at straight distances of `step_m`, from the first on. A last step that is short by
 // rounding alone counts.
@@ -39,9 +37,9 @@ Error wrong(const std::string& field, const std::string& what) {
 Status validate_end(const End& end, const std::string& field) {
   if (!is_finite(end.load_n) || length(end.load_n) > kMostLoadN)
     return wrong(field + ".load_n", "is outside 0 to 50 N");
-  if (!is_finite(end.velocity_m_s) || length(end.velocity_m_s) > kMostSpeed)
+  if (!is_finite(end.velocity_m_s) || length(end.velocity_m_s) > kMostSpeedM_s)
     return wrong(field + ".velocity_m_s", "is outside 0 to 5 m/s");
-  if (!(end.until_s >= 0 && end.until_s <= 1e6))
+  if (!(end.until_s >= 0 && end.until_s <= kMostSeconds))
     return wrong(field + ".until_s", "is outside 0 to 1000000 s");
   if (end.is_held ? end.load_n != Vec3d{} : end.velocity_m_s != Vec3d{})
     return wrong(field, "a held end has a velocity and no load, a free end has a load and none");
@@ -114,7 +112,7 @@ Status validate(const Rules& rules) {
     const auto field = "peg[" + std::to_string(i) + "]";
     if (!is_place(peg.from_m) || !is_place(peg.to_m))
       return wrong(field + ".from_m, to_m", "are not within 2 m around the origin");
-    if (!(peg.radius_m >= kLeastPegRadiusM && peg.radius_m <= 1))
+    if (!(peg.radius_m >= kLeastPegRadiusM && peg.radius_m <= kMostPegRadiusM))
       return wrong(field + ".radius_m", "is outside 0.001 to 1 m");
     if (!(peg.friction >= 0 && peg.friction <= 2))
       return wrong(field + ".friction", "is outside 0 to 2");

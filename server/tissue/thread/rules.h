@@ -15,10 +15,12 @@ namespace trocar::thread {
 
 inline constexpr double kSegmentM = 1e-3;  // from a node to the next, at rest
 inline constexpr std::size_t kMostThreads = 8, kMostPegs = 32, kMostPathPoints = 4096;
-inline constexpr std::size_t kLeastNodes = 4;    // of a thread
-inline constexpr std::size_t kMostNodes = 1200;  // of all threads
+inline constexpr std::size_t kLeastNodes = 4;                                    // of a thread
+inline constexpr std::size_t kMostNodes = 1200;                                  // of all threads
+inline constexpr double kMostM = 2;                                              // from the origin
+inline constexpr double kMostLoadN = 50, kMostSpeedM_s = 5, kMostSeconds = 1e6;  // of an end
 // A peg is met by nodes alone, so it is no thinner than what fits between two of them.
-inline constexpr double kLeastPegRadiusM = 1e-3;
+inline constexpr double kLeastPegRadiusM = 1e-3, kMostPegRadiusM = 1;
 
 // An end of a thread is free, with a load that grows from nothing, or held: it then goes on at a
 // velocity for a while.

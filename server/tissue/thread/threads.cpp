@@ -1,6 +1,7 @@
 #include "server/tissue/thread/threads.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace trocar::thread {
 
@@ -57,8 +58,17 @@ bool Threads::is_whole() const {
                          pairs.creeps_m.size() == count && holds.tools.size() == held &&
                          holds.offsets_m.size() == held && held <= nodes;
   const auto begins_segment = [&](auto node) { return node + std::size_t{1} < nodes; };
-  return has_sizes && std::ranges::all_of(places_m, [](auto& p) { return is_finite(p); }) &&
-         std::ranges::all_of(velocities_m_s, [](auto& v) { return is_finite(v); }) &&
+  const auto is_part = [](double part) { return part >= 0 && part <= 1; };
+  const auto are_finite = [](const std::vector<Vec3d>& all) {
+    return std::ranges::all_of(all, [](const Vec3d& one) { return is_finite(one); });
+  };
+  const auto are_numbers = [](const std::vector<double>& all) {
+    return std::ranges::all_of(all, [](double one) { return std::isfinite(one); });
+  };
+  return has_sizes && are_finite(places_m) && are_finite(velocities_m_s) && are_finite(creeps_m) &&
+         are_numbers(tensions_n) && are_finite(pairs.creeps_m) && are_numbers(pairs.press_n) &&
+         are_finite(holds.offsets_m) && std::ranges::all_of(pairs.place_first, is_part) &&
+         std::ranges::all_of(pairs.place_second, is_part) &&
          std::ranges::all_of(pairs.first, begins_segment) &&
          std::ranges::all_of(pairs.second, begins_segment) && is_joined.back() == 0 &&
          std::ranges::all_of(holds.nodes, [&](auto node) { return node < nodes; }) &&
