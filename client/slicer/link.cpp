@@ -26,6 +26,7 @@ namespace {
 constexpr std::chrono::milliseconds kPoll{4};
 constexpr std::uint64_t kGoodbyeNs = 2'500'000'000;  // longer than a source waits for that
 constexpr std::chrono::milliseconds kLastWords{200};
+constexpr const char* kWaiting = "waiting for a label map";
 
 // This program's part in one session.
 class Part {
@@ -104,6 +105,7 @@ class Link {
   Condition condition_ = Condition::NotReady;
   std::string text_;
   std::uint64_t end_ns_ = 0;  // 0: never
+  std::optional<Error> failure_;
 };
 
 Link::Link(const LinkOptions& options)
@@ -120,16 +122,15 @@ Link::Link(const LinkOptions& options)
               {.said = [this](const std::string& text) { say(Condition::Busy, text); },
                .failed =
                    [this](PeerId peer, const Error& error) {
-                     say(Condition::NotReady, "waiting for a label map");
-                     if (peer == 0) log::error("{}", error.message);
+                     if (!part_) say(Condition::NotReady, kWaiting);
+                     if (peer == 0) failure_ = error;
                      peers_.blame(peer, error);
                    },
                .made = [this](const std::filesystem::path& organ,
                               const Vec3d& offset_m) { note_organ(organ, offset_m); },
                .serving =
                    [this](std::uint16_t port) {
-                     if (const auto joined = join(port); !joined)
-                       log::error("{}", joined.error().message);
+                     if (const auto joined = join(port); !joined) failure_ = joined.error();
                    },
                .stopped =
                    [this](const std::string& why) {
@@ -145,16 +146,22 @@ void Link::say(Condition condition, const std::string& text) {
 }
 
 void Link::note_organ(const std::filesystem::path& organ, const Vec3d& offset_m) {
+  const Vec3d ras_mm = Vec3d{-offset_m.x, offset_m.z, offset_m.y} * 1e3;
+  const auto text = fmt::format("{} is made; its centre is at R {:.2f} A {:.2f} S {:.2f} mm",
+                                organ.string(), ras_mm.x, ras_mm.y, ras_mm.z);
+  log::info("{}", text);
+  peers_.publish("STATUS organ", status_message("Trocar_organ", Condition::Fine, text));
+  if (!options_.studio.serves) {
+    log::info(
+        "a session of it: trocar-server --organ {}, and beside it: trocar-igtl "
+        "--origin={:.2f},{:.2f},{:.2f}",
+        organ.string(), ras_mm.x, ras_mm.y, ras_mm.z);
+    return;
+  }
   part_.reset();
   publisher_.begin_anew();
   tools_.begin_anew();
   frames_ = Frames(offset_m);
-  if (options_.studio.serves) return;
-  const Vec3d ras_mm = Vec3d{-offset_m.x, offset_m.z, offset_m.y} * 1e3;
-  say(Condition::Fine,
-      fmt::format("made; a session of it: trocar-server --organ {}, and then: trocar-igtl "
-                  "--origin={:.2f},{:.2f},{:.2f}",
-                  organ.string(), ras_mm.x, ras_mm.y, ras_mm.z));
 }
 
 Status Link::join(std::uint16_t port) {
@@ -203,6 +210,8 @@ void Link::hear(PeerMessage message) {
 }
 
 Status Link::begin() {
+  if (!options_.studio.serves)
+    if (const auto joined = join(0); !joined) return joined;
   if (const auto opened = peers_.open(options_.address, options_.port); !opened) return opened;
   log::info("OpenIGTLink at {}:{}, Ctrl-C ends it", options_.address, peers_.port());
   if (!secure::is_loopback(options_.address))
@@ -221,10 +230,8 @@ Status Link::begin() {
   });
   if (options_.seconds > 0)
     end_ns_ = monotonic_ns() + static_cast<std::uint64_t>(std::llround(options_.seconds * 1e9));
-  if (!options_.label_map.empty())
-    if (const auto begun = studio_.take_file(options_.label_map); !begun) return begun;
-  if (!options_.studio.serves) return join(0);
-  if (options_.label_map.empty()) say(Condition::NotReady, "waiting for a label map");
+  if (!options_.label_map.empty()) return studio_.take_file(options_.label_map);
+  if (options_.studio.serves) say(Condition::NotReady, kWaiting);
   return {};
 }
 
@@ -233,7 +240,10 @@ void Link::step() {
   const auto now_ns = monotonic_ns();
   studio_.poll();
   if (part_) {
+    const bool was_there = part_->condition() == Condition::Fine;
     part_->poll();
+    if (!was_there && part_->condition() == Condition::Fine)
+      log::info("in the session at {}: {}", part_->source().name(), part_->text());
     if (part_->replica().newest() != nullptr) tools_.send_due(part_->source(), now_ns);
     publisher_.update(part_->replica(), frames_, now_ns);
     if (!studio_.is_busy()) {
@@ -247,7 +257,8 @@ void Link::step() {
 
 Result<ExitCode> Link::run() {
   if (const auto begun = begin(); !begun) return begun.error();
-  while (!is_stopped_ && !(part_ && part_->is_over() && !options_.studio.serves)) step();
+  while (!is_stopped_ && !failure_ && !(part_ && part_->is_over() && !options_.studio.serves))
+    step();
   return end();
 }
 
@@ -262,6 +273,7 @@ Result<ExitCode> Link::end() {
   context_.run_for(kPoll);
   part_.reset();
   studio_.end_session();
+  if (failure_) return *failure_;
   if (is_broken) return Error{ErrorCode::BadMessage, why};
   if (kind == replica::CloseKind::Refused) return Error{ErrorCode::Refused, why};
   if (kind == replica::CloseKind::Unreachable || kind == replica::CloseKind::Lost)

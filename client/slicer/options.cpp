@@ -167,7 +167,7 @@ void add_studio_options(CLI::App& app, LinkOptions& options) {
   app.add_flag("--serve", studio.serves,
                "hold a session, with trocar-server, of each label map that comes");
   app.add_option("--label-map", options.label_map,
-                 "with --serve or --folder: begin with this file, as trocar-organ import reads it")
+                 "with --serve: begin with this file, as trocar-organ import reads it")
       ->type_name("FILE");
   app.add_option("--folder", studio.folder,
                  "where label maps and organs of them are kept; without --serve none are taken "
@@ -191,10 +191,9 @@ Status check_studio(LinkOptions& options) {
     return Error{ErrorCode::Usage, "--record: is of sessions held here; give --serve too"};
   if (studio.serves && !options.way.join.empty())
     return Error{ErrorCode::Usage, "--join: --serve holds a session of its own; leave one out"};
-  if (studio.folder.empty()) {
-    if (options.label_map.empty()) return {};
-    return Error{ErrorCode::Usage, "--label-map: say what becomes of it: --serve or --folder DIR"};
-  }
+  if (!options.label_map.empty() && !studio.serves)
+    return Error{ErrorCode::Usage, "--label-map: is what a session begins with; give --serve too"};
+  if (studio.folder.empty()) return {};
   std::error_code error;
   if (!std::filesystem::is_directory(studio.folder, error))
     return Error{ErrorCode::Usage, "--folder: " + studio.folder.string() + " is no folder"};

@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "client/slicer/scan_files.h"
@@ -170,7 +171,8 @@ void Studio::finish_import() {
     waits_ = false;
     return fail({ErrorCode::BadFile, last_line(complaints)});
   }
-  log::info("{}", complaints);
+  std::istringstream lines(complaints);
+  for (std::string line; std::getline(lines, line);) log::info("{}", last_line(line));
   waits_ = false;
   if (const auto begun = begin_inspection(); !begun) fail(begun.error());
 }

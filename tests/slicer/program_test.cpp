@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/slicer/incoming.h"
 #include "common/math/box.h"
 #include "tests/e2e/programs.h"
 #include "tests/slicer/slicer_peer.h"
@@ -190,6 +191,77 @@ TEST_F(LinkProgram, ALabelMapBecomesASessionThatItsSenderWatches) {
   EXPECT_NE(log().find("fine surface of 576 triangles"), std::string::npos) << log();
   EXPECT_TRUE(peer.receive_until([&] { return peer.statuses["Trocar"].starts_with("1 "); }));
   link_->signal(SIGTERM);
+  EXPECT_EQ(link_->wait(30), 0) << log();
+}
+
+// A header with these figures and no body.
+std::string header_of(const std::string& type, std::uint64_t body_bytes, std::uint64_t crc = 0) {
+  std::string bytes(kHeaderBytes, '\0');
+  bytes[1] = 1;
+  type.copy(bytes.data() + 2, 12);
+  const auto put = [&](std::size_t at, std::uint64_t number) {
+    for (std::size_t i = 0; i < 8; ++i) bytes[at + i] = static_cast<char>(number >> (56 - 8 * i));
+  };
+  put(42, body_bytes);
+  put(50, crc);
+  return bytes;
+}
+
+TEST_F(LinkProgram, TheSessionNeverNoticesWhatPeersDo) {
+  start_server("plate");
+  const int port = start_link({"--hold", "Stylus=probe", "--surface-rate", "60"});
+  SlicerPeer good(port);
+  ASSERT_TRUE(good.receive_until([&] { return good.surfaces > 0; })) << log();
+  const auto says = [&](SlicerPeer& peer, const std::string& what) {
+    peer.statuses.erase("Trocar_refused");
+    EXPECT_TRUE(peer.receive_until([&] { return peer.statuses.contains("Trocar_refused"); }))
+        << what;
+    EXPECT_NE(peer.statuses["Trocar_refused"].find(what), std::string::npos)
+        << peer.statuses["Trocar_refused"];
+  };
+  {
+    SlicerPeer peer(port);
+    // What is not known is passed over; what is wrong is told, and the next message is read.
+    peer.send_bytes(header_of("VIDEO", 100'000) + std::string(100'000, 'v'));
+    peer.send_bytes(header_of("TRANSFORM", 48, 1) + std::string(48, 'x'));
+    peer.send_transform("Stylus", {});
+    says(peer, "TRANSFORM 'Stylus': matrix: is no rotation");
+    peer.send_transform("Stylus", upright({0, 1e6f, 0}));
+    says(peer, "allowed are 2000");
+    peer.send_bytes(header_of("IMAGE", std::uint64_t{200} << 20));
+    says(peer, "IMAGE '': body_size is 209715200 bytes, allowed are 134283336");
+    // It goes in the midst of that body.
+  }
+  {
+    SlicerPeer peer(port);
+    send_ellipsoid(peer);
+    says(peer, "nothing is taken");
+    for (int i = 0; i < 30; ++i) peer.send_transform("Stylus", {});
+    EXPECT_FALSE(peer.receive_until([] { return false; }, 10));
+    EXPECT_TRUE(peer.is_cut());
+  }
+  {
+    SlicerPeer peer(port);
+    peer.send_bytes("GET / HTTP/1.1\r\nHost: localhost\r\nAccept: text/html, */*\r\n\r\n");
+    EXPECT_FALSE(peer.receive_until([] { return false; }, 10));
+    EXPECT_TRUE(peer.is_cut());
+  }
+  // A peer that takes nothing, while another presses and sees the surface move.
+  const SlicerPeer lazy(port);
+  const Vec3f top = middle_of_front(good.surface.points_mm);
+  const int before = good.surfaces;
+  float turn = 0;
+  EXPECT_TRUE(good.receive_until([&] {
+    turn += 0.02f;
+    good.send_transform("Stylus", upright(top - Vec3f{0, 4 * std::sin(turn), 0}));
+    return good.surfaces > before + 20;
+  })) << good.surfaces;
+  EXPECT_NE(log().find("version is 18245"), std::string::npos) << log();
+  EXPECT_TRUE(good.statuses["Trocar"].starts_with("1 ")) << good.statuses["Trocar"];
+  EXPECT_TRUE(server_->is_running());
+  EXPECT_TRUE(link_->is_running());
+  EXPECT_EQ(e2e::read_text(folder_ / "server.log").find("error"), std::string::npos);
+  server_->signal(SIGTERM);
   EXPECT_EQ(link_->wait(30), 0) << log();
 }
 
