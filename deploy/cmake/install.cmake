@@ -3,7 +3,7 @@
 # <prefix>/share/trocar/web. Files of /etc belong to the packages alone (deploy/cmake/package.cmake).
 include(GNUInstallDirs)
 set(TROCAR_COMPONENT_PROGRAMS
-  server:trocar-server server:trocar-hall server:trocar-relay client:trocar-client client:trocar-doctor client:trocar-organ-edit
+  server:trocar-server server:trocar-hall server:trocar-relay client:trocar-client client:trocar-doctor client:trocar-organ-edit client:trocar-igtl
   web:trocar-web
   tools:trocar-organ tools:trocar-sim tools:trocar-journal tools:trocar-impair)
 set(files "${PROJECT_SOURCE_DIR}/deploy/install")

@@ -30,6 +30,8 @@ refuses trocar-sim none.toml --solver fem --step-ms
 refuses trocar-sim none.toml --solver fem --bulk-ratio
 refuses trocar-journal assess none.mcap --force-limit
 refuses trocar-journal assess none.mcap --strain-limit
+refuses trocar-igtl --rate
+refuses trocar-igtl --nodes
 refuses trocar-impair --seconds
 refuses trocar-impair --delay
 [ "$failures" = 0 ]
