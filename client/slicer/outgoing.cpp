@@ -6,6 +6,7 @@
 #include <igtlStringMessage.h>
 #include <igtlTransformMessage.h>
 #include <igtlUnit.h>
+#include <igtl_util.h>
 
 #include <vector>
 

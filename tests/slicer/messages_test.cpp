@@ -1,5 +1,5 @@
-// What peers say, byte by byte, as it may be and as it may not; and what they are told, as the
-// definition of OpenIGTLink has it.
+// Peers' messages are read byte by byte, as they may be and as they may not; and messages to peers
+// are as the definition of OpenIGTLink has them.
 
 #include <gtest/gtest.h>
 #include <igtlImageMessage.h>

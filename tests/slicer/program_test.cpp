@@ -221,7 +221,7 @@ TEST_F(LinkProgram, TheSessionNeverNoticesWhatPeersDo) {
   };
   {
     SlicerPeer peer(port);
-    // What is not known is passed over; what is wrong is told, and the next message is read.
+    // The unknown is passed over, the wrong is told, and the next message is read.
     peer.send_bytes(header_of("VIDEO", 100'000) + std::string(100'000, 'v'));
     peer.send_bytes(header_of("TRANSFORM", 48, 1) + std::string(48, 'x'));
     peer.send_transform("Stylus", {});
