@@ -112,6 +112,25 @@ TEST_F(LinkProgram, APeerSeesTheSessionAndPressesWithATrackedTool) {
   EXPECT_TRUE(server_->is_running());
 }
 
+TEST_F(LinkProgram, AKnifeFromSlicerCutsAndTheSurfaceGetsOtherTriangles) {
+  start_server("liver");
+  SlicerPeer peer(start_link({"--hold", "Knife=scalpel", "--surface-rate", "30"}));
+  ASSERT_TRUE(peer.receive_until([&] { return peer.surfaces > 0; })) << log();
+  const auto rest = peer.surface;
+  const Vec3f top = middle_of_front(rest.points_mm);
+  peer.send_text("Knife", "cut");
+  float way_mm = 0;
+  EXPECT_TRUE(peer.receive_until([&] {
+    way_mm += 0.5f;
+    const float depth_mm = std::min(way_mm - 10, 5.0f);
+    peer.send_transform("Knife", upright(top + Vec3f{std::max(way_mm - 15, 0.0f), -depth_mm, 0}));
+    return peer.surface.wounds > 0;
+  })) << way_mm
+      << log();
+  EXPECT_NE(peer.surface.triangles, rest.triangles);
+  EXPECT_GT(peer.surface.points_mm.size(), rest.points_mm.size());
+}
+
 // An ellipsoid of three unlike half axes, so that a turned or mirrored one is seen.
 constexpr Vec3f kCentre_mm{30, -20, 50}, kHalf_mm{40, 30, 24};
 constexpr int kVoxels = 26;
