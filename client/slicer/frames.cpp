@@ -33,8 +33,8 @@ Quatf quaternion_of(const std::array<Vec3f, 3>& axis) {
   return normalized(q);
 }
 
-Error not_allowed(const std::string& what) {
-  return {ErrorCode::BadMessage, what};
+Error refused(const std::string& what) {
+  return {ErrorCode::Refused, what};
 }
 
 }  // namespace
@@ -56,7 +56,8 @@ Transform Frames::to_ras(const Pose& world_from_tool) const {
 Result<Pose> Frames::from_ras(const Transform& m) const {
   for (const auto& row : m)
     for (const float number : row)
-      if (!std::isfinite(number)) return not_allowed("matrix: has a number that is not finite");
+      if (!std::isfinite(number))
+        return Error{ErrorCode::BadMessage, "matrix: has a number that is not finite"};
   std::array<Vec3f, 3> axis;
   for (std::size_t i = 0; i < 3; ++i) axis[i] = {m[0][i], m[1][i], m[2][i]};
   float skew = std::abs(dot(cross(axis[0], axis[1]), axis[2]) - 1);
@@ -66,14 +67,14 @@ Result<Pose> Frames::from_ras(const Transform& m) const {
   }
   // Numbers whose square overflows are no rotation either.
   if (!(skew <= kMostSkew))
-    return not_allowed(fmt::format(
+    return refused(fmt::format(
         "matrix: is no rotation within {}: it scales, shears, mirrors or cannot be inverted",
         kMostSkew));
   const Vec3d ras{m[0][3], m[1][3], m[2][3]};
   const Vec3d place_mm = Vec3d{-ras.x, ras.z, ras.y} - offset_m_ * kMillimetres;
   if (length(place_mm) > double{kFarthest_mm})
-    return not_allowed(fmt::format("matrix: is {:.0f} mm from the organ's centre, allowed are {}",
-                                   length(place_mm), kFarthest_mm));
+    return refused(fmt::format("matrix: is {:.0f} mm from the organ's centre, allowed are {}",
+                               length(place_mm), kFarthest_mm));
   const Vec3f x = axis[0] * (1 / length(axis[0]));
   const Vec3f y_like = axis[1] - x * dot(x, axis[1]);
   const Vec3f y = y_like * (1 / length(y_like));

@@ -34,8 +34,9 @@ class Frames {
   // Turns a vector of any unit, such as a force.
   static Vec3f to_ras_axes(const Vec3f& v) { return {-v.x, v.z, v.y}; }
   Transform to_ras(const Pose& world_from_tool) const;
-  // Error, without the message's name: a number is not finite, the axes are no rotation (they
-  // scale, shear or mirror, or cannot be inverted), or the place is beyond kFarthest_mm.
+  // Error, without the message's name: BadMessage if a number is not finite; Refused if the axes
+  // are no rotation (they scale, shear or mirror, or cannot be inverted), or the place is beyond
+  // kFarthest_mm, as a tracker may say that has lost its tool.
   Result<Pose> from_ras(const Transform& ras_from_tool) const;
 
  private:

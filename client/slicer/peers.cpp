@@ -10,6 +10,7 @@
 #include "common/base/log.h"
 #include "common/base/no_throw.h"
 #include "common/base/spawn.h"
+#include "common/base/timing.h"
 #include "common/intake/acceptor.h"
 
 namespace trocar::slicer {
@@ -18,6 +19,7 @@ namespace {
 using asio::ip::tcp;
 
 constexpr std::size_t kChunkBytes = 256 * 1024;
+constexpr std::uint64_t kSayAgainNs = 1'000'000'000;
 constexpr const char* kRefusals = "Trocar_refused";
 
 }  // namespace
@@ -70,6 +72,8 @@ struct Peers::Link : std::enable_shared_from_this<Peers::Link> {
   const PeerId id;
   std::deque<std::string> waiting;  // keys, each once
   SharedBytes refusal;              // null: none waits
+  std::string said;                 // why it was last blamed
+  std::uint64_t said_ns = 0;
   int faults = 0;
   bool is_over = false;
 };
@@ -96,10 +100,17 @@ void Peers::Link::ask_for(const std::string& key) {
 }
 
 void Peers::Link::blame(const Error& error) {
-  log::warn("{}: {}", peer->address(), error.message);
-  refusal = status_message(kRefusals, Condition::Refused, error.message);
-  wake.cancel();
-  if (++faults >= kMostFaults) cut("has said " + std::to_string(faults) + " things that are wrong");
+  const auto now_ns = monotonic_ns();
+  const bool is_known = error.message == said && now_ns - said_ns < kSayAgainNs;
+  if (!is_known) {
+    log::warn("{}: {}", peer->address(), error.message);
+    refusal = status_message(kRefusals, Condition::Refused, error.message);
+    said = error.message;
+    said_ns = now_ns;
+    wake.cancel();
+  }
+  if (error.code == ErrorCode::BadMessage && ++faults >= kMostFaults)
+    cut("has said " + std::to_string(faults) + " things that are wrong");
 }
 
 asio::awaitable<void> Peers::Link::serve() {

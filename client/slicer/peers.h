@@ -10,8 +10,8 @@
 //
 // So a slow peer is given the newest alone, and costs a list of keys. Who takes nothing for
 // kStall, or does not end a message within that time, is cut, as is who says kMostFaults things
-// that are wrong. Of bodies beyond kLargeBytes one is received at a time. Thread: the one that runs
-// the I/O context.
+// that are damaged or no message at all. Of bodies beyond kLargeBytes one is received at a time.
+// Thread: the one that runs the I/O context.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -58,7 +58,8 @@ class Peers {
   // Who comes later is sent it, too.
   void publish(const std::string& key, SharedBytes message);
   void retract(const std::string& key);
-  // Tells a peer, and the log, that what it has said is wrong.
+  // Tells a peer, and the log, that what it has said is wrong; the same again once a second. Only
+  // BadMessage counts as a fault.
   void blame(PeerId peer, const Error& error);
   // Waits for what is on its way, but not long, and lets all go.
   void close();

@@ -96,6 +96,10 @@ Status Studio::take(PeerMessage message) {
   if (is_busy())
     return Error{ErrorCode::Refused,
                  message.header.name() + ": an organ is being made, send it again"};
+  if (++taken_ > kMostTaken)
+    return Error{ErrorCode::Refused, fmt::format("{}: {} were taken, so none is any more: start "
+                                                 "trocar-igtl again",
+                                                 message.header.name(), kMostTaken)};
   for_peer_ = message.peer;
   reads_surface_ = message.header.kind() == Kind::Surface;
   stage_ = Stage::Reading;

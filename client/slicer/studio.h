@@ -43,6 +43,8 @@ struct StudioEvents {
   std::function<void(const std::string& why)> stopped;  // its server, which nobody has asked to
 };
 
+inline constexpr int kMostTaken = 100;  // label maps and surfaces, so that they fill no disk
+
 class Studio {
  public:
   Studio(StudioOptions options, StudioEvents events);
@@ -84,6 +86,7 @@ class Studio {
   std::optional<process::Child> child_, server_;
   std::optional<process::MemoryFile> said_, complained_;  // by the child
   std::filesystem::path ready_file_;
+  int taken_ = 0;
 };
 
 }  // namespace trocar::slicer

@@ -6,8 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include "client/slicer/incoming.h"
+#include "client/slicer/peers.h"
 #include "common/math/box.h"
 #include "tests/e2e/programs.h"
 #include "tests/slicer/slicer_peer.h"
@@ -228,9 +229,7 @@ std::string header_of(const std::string& type, std::uint64_t body_bytes, std::ui
 
 TEST_F(LinkProgram, TheSessionNeverNoticesWhatPeersDo) {
   start_server("plate");
-  const int port = start_link({"--hold", "Stylus=probe", "--surface-rate", "60"});
-  SlicerPeer good(port);
-  ASSERT_TRUE(good.receive_until([&] { return good.surfaces > 0; })) << log();
+  const int port = start_link({"--hold", "Stylus=probe"});
   const auto says = [&](SlicerPeer& peer, const std::string& what) {
     peer.statuses.erase("Trocar_refused");
     EXPECT_TRUE(peer.receive_until([&] { return peer.statuses.contains("Trocar_refused"); }))
@@ -255,7 +254,11 @@ TEST_F(LinkProgram, TheSessionNeverNoticesWhatPeersDo) {
     SlicerPeer peer(port);
     send_ellipsoid(peer);
     says(peer, "nothing is taken");
+    // A tracker that has lost its tool is borne with, damage is not.
     for (int i = 0; i < 30; ++i) peer.send_transform("Stylus", {});
+    says(peer, "is no rotation");
+    constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+    for (int i = 0; i < kMostFaults; ++i) peer.send_transform("Stylus", upright({kNan, 0, 0}));
     EXPECT_FALSE(peer.receive_until([] { return false; }, 10));
     EXPECT_TRUE(peer.is_cut());
   }
@@ -265,8 +268,21 @@ TEST_F(LinkProgram, TheSessionNeverNoticesWhatPeersDo) {
     EXPECT_FALSE(peer.receive_until([] { return false; }, 10));
     EXPECT_TRUE(peer.is_cut());
   }
-  // A peer that takes nothing, while another presses and sees the surface move.
+  SlicerPeer good(port);
+  EXPECT_TRUE(good.receive_until([&] { return good.statuses["Trocar"].starts_with("1 "); }));
+  EXPECT_NE(log().find("version is 18245"), std::string::npos) << log();
+  EXPECT_EQ(e2e::read_text(folder_ / "server.log").find("error"), std::string::npos);
+  // The link ends with its session.
+  server_->signal(SIGTERM);
+  EXPECT_EQ(link_->wait(30), 0) << log();
+}
+
+TEST_F(LinkProgram, APeerThatTakesNothingHoldsNobodyUp) {
+  start_server("plate");
+  const int port = start_link({"--hold", "Stylus=probe", "--surface-rate", "60"});
   const SlicerPeer lazy(port);
+  SlicerPeer good(port);
+  ASSERT_TRUE(good.receive_until([&] { return good.surfaces > 0; })) << log();
   const Vec3f top = middle_of_front(good.surface.points_mm);
   const int before = good.surfaces;
   float turn = 0;
@@ -275,13 +291,8 @@ TEST_F(LinkProgram, TheSessionNeverNoticesWhatPeersDo) {
     good.send_transform("Stylus", upright(top - Vec3f{0, 4 * std::sin(turn), 0}));
     return good.surfaces > before + 20;
   })) << good.surfaces;
-  EXPECT_NE(log().find("version is 18245"), std::string::npos) << log();
-  EXPECT_TRUE(good.statuses["Trocar"].starts_with("1 ")) << good.statuses["Trocar"];
   EXPECT_TRUE(server_->is_running());
   EXPECT_TRUE(link_->is_running());
-  EXPECT_EQ(e2e::read_text(folder_ / "server.log").find("error"), std::string::npos);
-  server_->signal(SIGTERM);
-  EXPECT_EQ(link_->wait(30), 0) << log();
 }
 
 }  // namespace
