@@ -14,6 +14,7 @@
 #include "common/command_line/command_line.h"
 #include "common/command_line/limits.h"
 #include "common/secure/join_code.h"
+#include "common/secure/loopback.h"
 #include "common/tool/instrument.h"
 
 namespace trocar::slicer {
@@ -23,10 +24,10 @@ constexpr const char* kExamples = R"(
 Examples:
   trocar-igtl
       shows 3D Slicer your own session on this machine: tools, surface, forces. In Slicer, in the
-      module OpenIGTLinkIF: +, Type Client, Hostname localhost, Port 18944, check Status
+      module OpenIGTLinkIF: +, Type Client, Hostname localhost, Port 18944, check Active
   trocar-igtl --hold Stylus=probe
-      the transform Stylus that Slicer sends moves a probe, which presses; in OpenIGTLinkIF put it
-      under OUT and right-click, Push on Connect
+      the transform Stylus that Slicer sends moves a probe, which presses; in OpenIGTLinkIF, I/O
+      Configuration, add it below OUT
   trocar-igtl --hold Left=grasper --hold Right=scissors --name Slicer
       two instruments; a text node Left that says grasp closes the jaws, one that says none opens
       them
@@ -184,6 +185,20 @@ void add_studio_options(CLI::App& app, LinkOptions& options) {
                "with --serve: record its sessions, as trocar-server does");
 }
 
+// Says where the session will be, and where this program then finds it.
+Status place_session(LinkOptions& options) {
+  const auto colon = options.server.rfind(':');
+  const auto address = options.server.substr(0, colon);
+  const bool is_for_all = address == "0.0.0.0";
+  if (colon == std::string::npos || !(is_for_all || secure::is_loopback(address)))
+    return Error{ErrorCode::Usage, "--server: '" + printable(options.server, 60) +
+                                       "' is not where --serve can hold a session: give "
+                                       "127.0.0.1:PORT for this machine, or 0.0.0.0:PORT for any"};
+  options.studio.listen = options.server;
+  if (is_for_all) options.server = "127.0.0.1" + options.server.substr(colon);
+  return {};
+}
+
 Status check_studio(LinkOptions& options) {
   auto& studio = options.studio;
   if (studio.serves && studio.folder.empty()) studio.folder = ".";
@@ -197,9 +212,8 @@ Status check_studio(LinkOptions& options) {
   std::error_code error;
   if (!std::filesystem::is_directory(studio.folder, error))
     return Error{ErrorCode::Usage, "--folder: " + studio.folder.string() + " is no folder"};
-  studio.listen = options.server;
   studio.is_insecure = options.way.is_insecure;
-  return {};
+  return studio.serves ? place_session(options) : Status();
 }
 
 Status read_further(const Texts& texts, LinkOptions& options) {
