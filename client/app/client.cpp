@@ -14,6 +14,7 @@
 #include "client/device/device_list.h"
 #include "client/device/returning_device.h"
 #include "client/net/net_source.h"
+#include "client/net/way_in.h"
 #include "client/replay/recorded_hand.h"
 #include "client/replay/replay_source.h"
 #include "client/replica/client_messages.h"
@@ -22,8 +23,6 @@
 #include "common/base/signals.h"
 #include "common/base/timing.h"
 #include "common/lesson/lesson_texts.h"
-#include "common/secure/link_file.h"
-#include "common/secure/loopback.h"
 #include "common/tool/script.h"
 
 namespace trocar::app {
@@ -290,41 +289,6 @@ Result<ExitCode> Run::conclude(const Status& outcome) {
   return ExitCode::Ok;
 }
 
-Status set_security(const ClientOptions& options, net::NetSourceOptions& connection) {
-  const bool is_loopback = secure::is_loopback(connection.host);
-  if (options.is_insecure) {
-    if (is_loopback) return {};
-    return Error{ErrorCode::Usage,
-                 "--insecure-loopback: " + connection.host +
-                     " is no address of this machine: use it with 127.0.0.1 or [::1]"};
-  }
-  // Whatever that name leads to: the link file's code says whose certificate it must be.
-  if (options.join.empty() && !is_loopback && connection.host != "localhost")
-    return Error{ErrorCode::Usage, "--server: " + connection.host +
-                                       " is another machine: give --join CODE as its server "
-                                       "printed it"};
-  if (options.ca_file.empty()) {
-    connection.tls = secure::make_client_context();
-  } else {
-    auto tls = secure::make_client_context_with_ca(options.ca_file);
-    if (!tls) return tls.error();
-    connection.tls = std::move(*tls);
-    connection.trusts_ca = true;
-  }
-  if (options.join.empty()) {
-    connection.join_code = [port = connection.port, role = replica::name_of(options.role)] {
-      return secure::read_link_file(port, role);
-    };
-  } else {
-    connection.join_code = [text = options.join]() -> Result<secure::JoinCode> {
-      const auto invitation = secure::parse_invitation(text);
-      if (!invitation) return invitation.error();
-      return invitation->code;
-    };
-  }
-  return {};
-}
-
 }  // namespace
 
 void install_signal_handlers() {
@@ -436,7 +400,9 @@ Result<ExitCode> run_chosen(const ClientOptions& options,
   net::NetSourceOptions connection;
   if (const auto parsed = net::parse_server_address(options.server, connection); !parsed)
     return Error{parsed.error().code, "--server: " + parsed.error().message};
-  if (const auto set = set_security(options, connection); !set) return set.error();
+  const net::WayIn way_in{options.join, options.ca_file, options.is_insecure,
+                          replica::name_of(options.role)};
+  if (const auto set = net::set_way_in(way_in, connection); !set) return set.error();
   connection.connect_deadline =
       std::chrono::milliseconds(static_cast<std::int64_t>(options.wait_s * 1e3));
   connection.participant_name = options.name;
