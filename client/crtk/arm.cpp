@@ -14,7 +14,8 @@ namespace {
 constexpr Joints kHome{0, 0, 0.08, 0, 0, 0};
 constexpr double kHomingTurn_rad_s = 0.5, kHomingSlide_m_s = 0.05;
 constexpr double kLeastJaw_rad = -0.35, kMostJaw_rad = 1.4;
-constexpr double kUnitSlack = 0.01;  // of a quaternion's length
+constexpr double kMostFrame_s = 0.05;  // of simulated time, for which a force moves the arm
+constexpr double kUnitSlack = 0.01;    // of a quaternion's length
 constexpr Quatf kHalfTurn{1, 0, 0,
                           0};  // the engine's tools have +z along the shaft, out of the body
 
@@ -160,13 +161,10 @@ void Arm::step(std::uint64_t now_ns) {
   const double dt_s = seconds_between(step_ns_, now_ns, 0.01);
   step_ns_ = now_ns;
   if (state_.is_busy && state_.state == State::Enabled && hold_.empty()) home(dt_s);
-  if (!force_n_) return;
-  if (now_ns - servo_ns_ > kStaleNs) {
+  if (force_n_ && now_ns - servo_ns_ > kStaleNs) {
     force_n_.reset();
     notice_ = "servo_cf: the stream has ended, the arm stays where it is";
-    return;
   }
-  if (state_.can_move() && hold_.empty()) press(dt_s);
 }
 
 void Arm::home(double dt_s) {
@@ -215,6 +213,7 @@ Measured Arm::measure(const replica::Tool& tool, Tick tick) {
     for (std::size_t i = 0; i < kMostJoints; ++i)
       now.joint_speeds[i] = (now.joints[i] - measured_->joints[i]) / dt_s;
     now.jaw_speed_rad_s = (now.jaw_rad - measured_->jaw_rad) / dt_s;
+    if (force_n_ && state_.can_move() && hold_.empty()) press(std::min(dt_s, kMostFrame_s));
   }
   measured_ = now;
   measured_tick_ = tick;

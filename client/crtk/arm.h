@@ -4,12 +4,12 @@
 // DDS, no network and no clock of its own.
 //
 //   servo_cp --checks--> joints within limits --> setpoint --> ToolSample
-//   servo_cf --checks--> force --step: moves with (force + that of the tissue) / damping--^
+//   servo_cf --checks--> force --measure: moves with (force + that of the tissue) / damping--^
 //   jaw/servo_jp --checks--> jaw angle --> verb
 //
 // Outside data: what is no number, in another frame, too far from the setpoint or not allowed in
 // this state changes nothing, and an error says why. A stream that ends leaves the arm where it is.
-// Thread: one.
+// A force moves the arm from frame to frame, in simulated time, as the tissue does. Thread: one.
 
 #include <cstdint>
 #include <optional>
@@ -37,7 +37,7 @@ class Arm {
   static constexpr double kMostJump_m = 0.03, kMostJump_rad = 0.8;  // from one servo_cp to the next
   static constexpr double kMostSpeed_m_s = 1, kMostSpeed_rad_s = 6;
   static constexpr double kMostForce_n = 10;
-  static constexpr double kDamping_n_s_m = 100, kMostForceSpeed_m_s = 0.05;  // of servo_cf
+  static constexpr double kDamping_n_s_m = 40, kMostForceSpeed_m_s = 0.05;  // of servo_cf
   static constexpr std::uint64_t kStaleNs = 100'000'000;  // a servo_cf without a next one ends
   static constexpr double kClosed_rad = 0.05, kOpen_rad = 0.15;
 
@@ -48,7 +48,7 @@ class Arm {
   Status take(const ServoWrench& servo, std::uint64_t now_ns);
   Status take(const ServoJaw& servo);
   Status follow(std::string_view command);
-  // Moves on: homing, and servo_cf. Call it at least every 10 ms.
+  // Homes, if it has to, and ends what is stale. Call it at least every 10 ms.
   void step(std::uint64_t now_ns);
 
   // Says what is wrong with the arm; empty: nothing is. It becomes a FAULT.

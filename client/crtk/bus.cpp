@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "common/base/log.h"
+#include "common/base/printable.h"
 #include "common/base/timing.h"
 
 namespace trocar::crtk {
@@ -42,6 +44,13 @@ std::string configuration(const BusSettings& settings) {
   text += "</Domain></CycloneDDS>";
   const char* const own = std::getenv("CYCLONEDDS_URI");
   return own != nullptr && *own != '\0' ? text + "," + own : text;
+}
+
+// DDS speaks through our log, which holds a flood back. On its threads.
+void pass_on(void*, const dds_log_data_t* line) {
+  std::string_view text(line->message, line->size);
+  while (text.ends_with('\n')) text.remove_suffix(1);
+  log::warn("DDS: {}", printable(text));
 }
 
 // Cyclone DDS takes datagrams from everywhere, whatever its interface is. From now on the sockets
@@ -146,6 +155,7 @@ Status Bus::create(const BusSettings& settings) {
                                                  dds_strretcode(code) +
                                                  "); check --interface and CYCLONEDDS_URI"};
   };
+  dds_set_log_sink(pass_on, nullptr);
   domain_ = dds_create_domain(settings.domain, configuration(settings).c_str());
   if (domain_ < 0) return failed("the domain cannot be opened", domain_);
   Qos qos(dds_create_qos());

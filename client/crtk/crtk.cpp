@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <map>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -27,19 +26,25 @@ void sleep_ns(std::uint64_t ns) {
   std::this_thread::sleep_for(std::chrono::nanoseconds(ns));
 }
 
-// Says the same thing once a second at most, and one thing in 100 ms.
+// Says the same thing once a second at most, and ten things a second.
 class Words {
  public:
   bool may_say(const std::string& text, std::uint64_t now_ns) {
-    if (now_ns - said_ns_ < (text == said_ ? kSameWordsNs : kSameWordsNs / 10)) return false;
-    said_ = text;
-    said_ns_ = now_ns;
+    std::erase_if(said_, [&](const Said& one) { return now_ns - one.ns >= kSameWordsNs; });
+    if (said_.size() >= kMostWords) return false;
+    if (std::ranges::find(said_, text, &Said::text) != said_.end()) return false;
+    said_.push_back({text, now_ns});
     return true;
   }
 
  private:
-  std::string said_;
-  std::uint64_t said_ns_ = 0;
+  struct Said {
+    std::string text;
+    std::uint64_t ns = 0;
+  };
+  static constexpr std::size_t kMostWords = 10;
+
+  std::vector<Said> said_;
 };
 
 struct Place {

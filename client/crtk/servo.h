@@ -16,17 +16,23 @@ struct ServoPose {
   std::string frame;  // of the header
   std::array<double, 3> position_m{};
   std::array<double, 4> orientation{0, 0, 0, 1};  // x, y, z, w
+
+  bool operator==(const ServoPose&) const = default;
 };
 
 // servo_cf: with what the arm should press. Likewise.
 struct ServoWrench {
   std::string frame;
   std::array<double, 3> force_n{}, torque_nm{};
+
+  bool operator==(const ServoWrench&) const = default;
 };
 
 // jaw/servo_jp: how far the jaws should be open. Likewise.
 struct ServoJaw {
   std::vector<double> position_rad;
+
+  bool operator==(const ServoJaw&) const = default;
 };
 
 // This is what an arm measures, from one frame of the session.

@@ -146,7 +146,7 @@ check_section() { # HEADING COMMAND...
 check_options() {
   local program sub page option known
   known=$(mktemp)
-  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor; do
+  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor $(cd "$bin" && ls trocar-crtk 2>/dev/null); do
     [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
     help_of "$bin/$program" | options_of_help >>"$known"
