@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/crtk/messages.h"
@@ -102,6 +103,15 @@ TEST_F(CrtkPress, AnotherMakersProgramPressesOnTheLiverAndFeelsIt) {
   wrong.frame = "world";
   go(wrong);
   EXPECT_TRUE(is_warned("frame_id"));
+  EXPECT_LT(std::abs(tip().position[0] - pressed.position[0]), 0.005);
+
+  // A flood is not followed either, and fills no log.
+  for (int i = 0; i < 3'000; ++i) {
+    wrong.position[0] = i;
+    go(wrong);
+  }
+  const auto lines = log();
+  EXPECT_LT(std::ranges::count(lines, '\n'), 60) << lines;
   EXPECT_LT(std::abs(tip().position[0] - pressed.position[0]), 0.005);
 
   // By force: it finds the place where the liver presses back as much.
