@@ -160,8 +160,8 @@ check_options() {
     help_of "./$program" | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
   grep -hoE '"--[a-z][a-z0-9-]*"' server/python/trocar/*.py deploy/python/*.py | tr -d '"' >>"$known"
-  # Of cmake, systemctl, podman and bench_crowd.
-  printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"
+  # Of cmake, systemctl, podman, ros2 and bench_crowd.
+  printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init --once >>"$known"
   for page in "${pages[@]}"; do
     while read -r option; do
       fault "$page: names $option, which no program or script has"
