@@ -4,19 +4,18 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
 #include <map>
 
 #include "client/ui/hud.h"
-#include "common/base/printable.h"
 #include "common/base/size_option.h"
 #include "common/base/version.h"
 #include "common/command_line/command_line.h"
 #include "common/command_line/limits.h"
 #include "common/secure/join_code.h"
+#include "common/tool/port.h"
 #include "common/wire/role.h"
 
 namespace trocar::app {
@@ -87,21 +86,9 @@ Status parse_view(const std::vector<double>& numbers, StartView& view) {
 
 Status parse_ports(const std::vector<std::string>& texts, std::vector<Vec3d>& ports_m) {
   for (const auto& text : texts) {
-    double mm[3]{};
-    const char* at = text.data();
-    const char* const end = at + text.size();
-    bool is_place = true;
-    for (int i = 0; i < 3 && is_place; ++i) {
-      const auto [stop, failure] = std::from_chars(at, end, mm[i]);
-      is_place = failure == std::errc{} && std::abs(mm[i]) <= 2000 &&
-                 (i == 2 ? stop == end : stop < end && *stop == ',');
-      at = stop + (i == 2 ? 0 : 1);
-    }
-    if (!is_place)
-      return Error{ErrorCode::Usage,
-                   "--port: '" + printable(text, 40) +
-                       "' is not X,Y,Z in mm, up to 2000 each, such as 0,120,150"};
-    ports_m.push_back(Vec3d{mm[0], mm[1], mm[2]} * 1e-3);
+    const auto port_m = tool::parse_port(text);
+    if (!port_m) return port_m.error();
+    ports_m.push_back(*port_m);
   }
   return {};
 }

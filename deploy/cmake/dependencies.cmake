@@ -28,6 +28,14 @@ if(TROCAR_CLIENT)
   find_package(OpenGL REQUIRED COMPONENTS OpenGL EGL)
   pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
   pkg_check_modules(fontconfig REQUIRED IMPORTED_TARGET fontconfig)
+  # Robots' door, which a build may do without.
+  find_package(CycloneDDS 0.10 CONFIG QUIET)
+  find_program(IDLC_PROGRAM idlc)
+  if(CycloneDDS_FOUND AND IDLC_PROGRAM)
+    set(TROCAR_HAS_CYCLONE ON)
+  else()
+    message(STATUS "trocar-crtk is left out: it needs cyclonedds-dev and cyclonedds-tools")
+  endif()
 endif()
 # OpenIGTLink's own CMake package changes the flags of all that is compiled. Without it there is no trocar-igtl.
 find_path(OPENIGTLINK_INCLUDE igtlMessageBase.h PATH_SUFFIXES openigtlink)
@@ -43,6 +51,8 @@ if(TROCAR_TESTS)
   # Benchmarks, and the library they compare with (single precision).
   find_package(benchmark REQUIRED)
   pkg_check_modules(bullet REQUIRED IMPORTED_TARGET bullet)
+  # Another maker's DDS, to test ours with.
+  find_package(fastrtps 2.9 CONFIG QUIET)
 endif()
 
 # Asio compiled once (common/base) instead of in every file that includes it.

@@ -1,9 +1,10 @@
-# What `cmake --install build/release` copies, as one component for each package: server, client, tools,
-# web, python and doc. Programs look for nothing but what lies beside them: the page of trocar-web is in
+# What `cmake --install build/release` copies, as one component for each package: server, client, crtk,
+# tools, web, python and doc. Programs look for nothing but what lies beside them: the page of trocar-web is in
 # <prefix>/share/trocar/web. Files of /etc belong to the packages alone (deploy/cmake/package.cmake).
 include(GNUInstallDirs)
 set(TROCAR_COMPONENT_PROGRAMS
   server:trocar-server server:trocar-hall server:trocar-relay client:trocar-client client:trocar-doctor client:trocar-organ-edit client:trocar-igtl
+  crtk:trocar-crtk
   web:trocar-web
   tools:trocar-organ tools:trocar-sim tools:trocar-journal tools:trocar-impair)
 set(files "${PROJECT_SOURCE_DIR}/deploy/install")

@@ -19,6 +19,9 @@ set(packaged server client tools web doc)
 if(TROCAR_PYTHON)
   list(APPEND packaged python)
 endif()
+if(TARGET trocar-crtk)
+  list(APPEND packaged crtk)
+endif()
 # package_name(<variable> <component>): Debian names modules for Python by another rule.
 function(package_name variable component)
   set(${variable} "trocar-${component}" PARENT_SCOPE)
@@ -92,6 +95,12 @@ Trocar lets several people, each at a machine of their own, work on one
 organ that one server owns. This package has the window in which somebody
 takes part in a session, watches one, or plays a recorded one.
 ${processor}")
+set(CPACK_DEBIAN_CRTK_DESCRIPTION "surgery simulator: instruments that robots' programs move
+Trocar lets several people, each at a machine of their own, work on one
+organ that one server owns. This package lets programs for a da Vinci
+Research Kit move instruments of a session, and feel with them, by CRTK
+over DDS as in ROS 2.
+${processor}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "surgery simulator: organs, experiments and recordings
 Trocar lets several people, each at a machine of their own, work on one
 organ that one server owns. This package makes and inspects organs, runs
@@ -124,6 +133,7 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS "trocar-tools")
 set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS "avahi-daemon, trocar-web, trocar-doc")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "gnuplot-nox")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "trocar-client, trocar-doc, weasyprint")
+set(CPACK_DEBIAN_CRTK_PACKAGE_SUGGESTS "trocar-server, trocar-client, trocar-doc")
 set(CPACK_DEBIAN_WEB_PACKAGE_DEPENDS "${sysusers}")
 set(CPACK_DEBIAN_WEB_PACKAGE_RECOMMENDS "trocar-tools")
 set(CPACK_DEBIAN_WEB_PACKAGE_SUGGESTS "trocar-server, trocar-doc")

@@ -38,7 +38,7 @@ absolute() {
 
 # All programs, as deploy/build and deploy/package build them.
 all_programs=(trocar-server trocar-hall trocar-relay trocar-client trocar-organ trocar-organ-edit trocar-sim trocar-journal
-  trocar-impair trocar-web trocar-doctor trocar-igtl)
+  trocar-impair trocar-web trocar-doctor trocar-igtl trocar-crtk)
 
 # build PRESET [TARGET...]: configures if needed and builds. The lines that say how far it is begin with
 # $building. Tests are there if the script sets with_tests=true, after deploy/setup --with-tests; the page

@@ -146,7 +146,7 @@ check_section() { # HEADING COMMAND...
 check_options() {
   local program sub page option known
   known=$(mktemp)
-  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor trocar-igtl; do
+  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor $(cd "$bin" && ls trocar-igtl trocar-crtk 2>/dev/null); do
     [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
     help_of "$bin/$program" | options_of_help >>"$known"
@@ -160,8 +160,8 @@ check_options() {
     help_of "./$program" | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
   grep -hoE '"--[a-z][a-z0-9-]*"' server/python/trocar/*.py deploy/python/*.py | tr -d '"' >>"$known"
-  # Of cmake, systemctl, podman and bench_crowd.
-  printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"
+  # Of cmake, systemctl, podman, ros2 and bench_crowd.
+  printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init --once >>"$known"
   for page in "${pages[@]}"; do
     while read -r option; do
       fault "$page: names $option, which no program or script has"

@@ -96,7 +96,7 @@ check "each program starts" inside sh -c \
 check "completions are sound" inside bash -c \
   'for f in /usr/share/bash-completion/completions/trocar-*; do . $f; complete -p ${f##*/} || exit 1; done'
 check "each program has a page for man" inside sh -c \
-  'for p in /usr/bin/trocar-*; do dpkg -L trocar-server trocar-client trocar-tools trocar-web | grep -q "man1/${p##*/}.1.gz" || exit 1; done'
+  'for p in /usr/bin/trocar-*; do dpkg -L trocar-server trocar-client trocar-crtk trocar-tools trocar-web | grep -q "man1/${p##*/}.1.gz" || exit 1; done'
 # Programs are stripped; what was taken away lies where a debugger looks, under the program's id.
 lines_for_debuggers() {
   local file id faults=0
