@@ -7,6 +7,7 @@
 
 #include "client/device/ray_pick.h"
 #include "client/shape/ribbon.h"
+#include "client/shape/thread_mesh.h"
 
 namespace trocar::app {
 namespace {
@@ -149,14 +150,14 @@ std::optional<Vec3f> Pane::lesson_target(const replica::Replica& replica) {
 
 void Pane::add_lines(const replica::Replica& replica) {
   lines_.update(replica, scene_.positions);
-  drawing_.clear();
+  meshes_.drawing.clear();
   for (const auto& line : lines_.lines()) {
     std::vector<shape::RibbonPoint> points;
     for (const auto& point : line.points) points.push_back({point.position, point.normal});
     shape::add_ribbon(points, kLineHalfWidth, shape::colour_of_pointer(line.participant.value),
-                      drawing_);
+                      meshes_.drawing);
   }
-  scene_.drawing = drawing_;
+  scene_.drawing = meshes_.drawing;
 }
 
 void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const Look& look) {
@@ -179,6 +180,9 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
     for (const replica::Tool& tool : surface_.tools())
       scene_.tools.push_back(scene_tool(replica, tool, hands));
     add_lines(replica);
+    meshes_.threads.clear();
+    shape::add_threads(surface_.threads(), surface_.thread_places(), meshes_.threads);
+    scene_.threads = meshes_.threads;
     for (const replica::Pointer& pointer : replica.told().pointers(now_ns_))
       scene_.pointers.push_back(
           {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});

@@ -25,6 +25,10 @@ namespace trocar::app {
 const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot);
 tool::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot);
 
+struct PaneMeshes {
+  shape::MeshVertices drawing, threads;
+};
+
 class Pane {
  public:
   // `sees_with`: the name of who holds the tool to see with, once there is one.
@@ -99,7 +103,7 @@ class Pane {
   LentView lent_;
   std::string sees_with_;
   replica::DrawnLines lines_;
-  shape::MeshVertices drawing_;  // of the last picture
+  PaneMeshes meshes_;  // of the last picture
   replica::HeldTissue held_;
   std::uint64_t held_history_ = 0;
   replica::MeasuredPlaces measured_;

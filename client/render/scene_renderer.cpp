@@ -448,6 +448,7 @@ void SceneRenderer::Parts::draw_tools(const SceneView& scene, const OrbitCamera&
   glBindVertexArray(tool_array.array);
   glBindBuffer(GL_ARRAY_BUFFER, tool_array.buffer);
   for (const SceneTool& shown : scene.tools) draw_tool(shown, scene.seconds);
+  if (!scene.threads.empty()) draw_mesh(scene.threads, matrix_of(Pose{}), 0, 1);
   for (const SceneTool& shown : scene.tools) draw_ghost(shown);
   if (!scene.drawing.empty()) draw_mesh(scene.drawing, matrix_of(Pose{}), kDrawingGlow, 1);
   for (const ScenePointer& shown : scene.pointers) draw_pointer(shown, camera);

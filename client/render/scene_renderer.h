@@ -68,6 +68,7 @@ struct SceneView {
   std::vector<SceneTool> tools;
   std::vector<ScenePointer> pointers;
   std::span<const shape::MeshVertex> drawing;  // in the world frame; lies on the surface
+  std::span<const shape::MeshVertex> threads;  // in the world frame, with pegs
   float seconds = 0;                           // since the last picture
 };
 

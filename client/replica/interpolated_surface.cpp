@@ -138,6 +138,19 @@ void InterpolatedSurface::glide(std::uint64_t now_ns) {
     positions_[i] = glide_from_[i] * (1 - share) + positions_[i] * share;
 }
 
+void InterpolatedSurface::interpolate_threads(const SessionFrame& before, const SessionFrame& known,
+                                              float t) {
+  threads_ = known.threads;
+  const auto& to = threads_.places;
+  const auto& from = before.threads.places;
+  const bool moves = before.has_state && from.size() == to.size();
+  thread_places_.resize(to.size());
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    const Vec3f end = wire::to_metres(to[i]);
+    thread_places_[i] = moves ? wire::to_metres(from[i]) * (1 - t) + end * t : end;
+  }
+}
+
 void InterpolatedSurface::interpolate(const Topology& topology, const SessionFrame& before,
                                       const SessionFrame& after, float t) {
   const auto& rest = topology.rest_positions;
@@ -160,6 +173,7 @@ void InterpolatedSurface::interpolate(const Topology& topology, const SessionFra
   if (!known.has_state) return;
   tools_ = known.tools;
   regions_ = t < 0.5f && before.has_state ? before.regions : known.regions;
+  interpolate_threads(before, known, t);
   if (&known == &before || !before.has_state) return;
   for (Tool& tool : tools_) {
     const auto earlier = std::ranges::find(before.tools, tool.slot, &Tool::slot);

@@ -65,10 +65,14 @@ class InterpolatedSurface {
   const std::vector<float>& blood() const { return blood_; }
   const std::vector<Tool>& tools() const { return tools_; }
   const std::vector<std::uint16_t>& regions() const { return regions_; }
+  const wire::ThreadPicture& threads() const { return threads_; }
+  // m, per node of the threads.
+  const std::vector<Vec3f>& thread_places() const { return thread_places_; }
 
  private:
   void interpolate(const Topology& topology, const SessionFrame& before, const SessionFrame& after,
                    float t);
+  void interpolate_threads(const SessionFrame& before, const SessionFrame& known, float t);
   void restart(const Replica& replica, std::uint64_t now_ns);
   void glide(std::uint64_t now_ns);
 
@@ -81,6 +85,8 @@ class InterpolatedSurface {
   std::vector<float> blood_;
   std::vector<Tool> tools_;
   std::vector<std::uint16_t> regions_;
+  wire::ThreadPicture threads_;
+  std::vector<Vec3f> thread_places_;
   std::uint64_t welcome_count_ = 0;
   std::uint64_t glide_begin_ns_ = 0;
   std::vector<Vec3f> glide_from_;  // m, per vertex slot; empty: no glide

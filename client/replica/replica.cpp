@@ -370,6 +370,12 @@ void Replica::apply_state(const proto::FrameState& message) {
   auto figures = wire::read(message);
   if (!figures) return fail(figures.error().message);
   frame.figures = *figures;
+  frame.threads = {};
+  if (message.has_threads()) {
+    auto threads = wire::decode_threads(bytes_of(std::string_view(message.threads())));
+    if (!threads) return fail("FrameState." + threads.error().message);
+    frame.threads = *std::move(threads);
+  }
   frame.has_state = true;
 }
 

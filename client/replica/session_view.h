@@ -15,6 +15,7 @@
 #include "common/wire/figures.h"
 #include "common/wire/quantise.h"
 #include "common/wire/role.h"
+#include "common/wire/thread_codec.h"
 
 namespace trocar::replica {
 
@@ -72,6 +73,7 @@ struct SessionFrame {
   bool has_state = false;              // the rest is valid: its FrameState has arrived
   std::vector<Tool> tools;             // by slot
   std::vector<std::uint16_t> regions;  // per vertex slot: 0 not active, else merged region
+  wire::ThreadPicture threads;         // empty: there is none
   wire::FrameFigures figures;
 };
 

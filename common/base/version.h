@@ -12,6 +12,6 @@ inline constexpr std::uint32_t kSimVersion = 28;
 
 // Wire protocol. Major must match; a newer minor only adds fields and messages.
 inline constexpr std::uint32_t kProtocolMajor = 1;
-inline constexpr std::uint32_t kProtocolMinor = 23;
+inline constexpr std::uint32_t kProtocolMinor = 24;
 
 }  // namespace trocar

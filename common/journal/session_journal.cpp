@@ -158,6 +158,10 @@ Result<std::optional<proto::BleedingRules>> SessionJournal::bleeding() {
   return last<proto::BleedingRules>(JournalTopic::Bleeding, info_.begin_tick());
 }
 
+Result<std::optional<proto::ThreadRules>> SessionJournal::threads() {
+  return last<proto::ThreadRules>(JournalTopic::Threads, info_.begin_tick());
+}
+
 Status SessionJournal::read_tick_records(Tick from, Tick to,
                                          const TickVisitor<proto::TickRecord>& visitor) {
   // A batch carries the tick of its frame, the last of its records.

@@ -68,6 +68,7 @@ class SessionJournal {
   Result<std::optional<proto::ExternalLoads>> loads();
   // Nothing if the session did not bleed.
   Result<std::optional<proto::BleedingRules>> bleeding();
+  Result<std::optional<proto::ThreadRules>> threads();
 
   // Records of ticks in [from, to], in order.
   Status read_tick_records(Tick from, Tick to, const TickVisitor<proto::TickRecord>& visitor);

@@ -32,6 +32,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/drawing", proto::Drawing::descriptor()},
       {"/overview", proto::Overview::descriptor()},
       {"/bleeding", proto::BleedingRules::descriptor()},
+      {"/threads", proto::ThreadRules::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

@@ -19,6 +19,7 @@
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
 //   /overview        Overview         every 30 s, in a chunk of its own: what a page plots of them
 //   /bleeding        BleedingRules    once, at the start, of a session that bleeds
+//   /threads         ThreadRules      once, at the start, of a session with surgical thread
 //   /gap             JournalGap       where the queue to the writer was full
 //   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
 //
@@ -56,8 +57,9 @@ enum class JournalTopic : std::uint8_t {
   Drawing,
   Overview,
   Bleeding,
+  Threads,
 };
-inline constexpr int kJournalTopicCount = 17;
+inline constexpr int kJournalTopicCount = 18;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

@@ -71,6 +71,7 @@ install(FILES "${files}/trocar.xml" DESTINATION "${share}/mime/packages" COMPONE
 
 # Scripts of hands, scenarios and their curves.
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/deploy/scenes" DESTINATION "${share}/trocar" COMPONENT tools)
+install(DIRECTORY "${PROJECT_SOURCE_DIR}/deploy/threads" DESTINATION "${share}/trocar" COMPONENT server)
 
 install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-web.service" DESTINATION lib/systemd/system COMPONENT web)
 install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-web.toml.example"

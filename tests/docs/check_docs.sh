@@ -171,7 +171,7 @@ check_options() {
   rm -f "$known"
 }
 
-readers=(server/lab/scenario/*.cpp common/tool/script*.cpp)
+readers=(server/lab/scenario/*.cpp server/tissue/thread/rules_toml.cpp common/tool/script*.cpp)
 # Keys in the first or, below '| table | key', second cells of the tables.
 documented_keys() {
   awk -F'|' '/^\| table \| key/ {c = 3; next} /^\| key in|^\| key \|/ {c = 2; next} /^$/ {c = 0}

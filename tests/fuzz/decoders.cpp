@@ -24,6 +24,7 @@
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
+#include "common/wire/thread_codec.h"
 #include "proto/fine_surface.pb.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
@@ -138,6 +139,17 @@ bool decode_blood(BytesView bytes) {
   const bool is_accepted = checked(wire::decode_blood(bytes, levels));
   TROCAR_ASSERT(is_accepted || levels == before);
   return is_accepted;
+}
+
+// A picture that is accepted comes out again as it was.
+bool decode_threads(BytesView bytes) {
+  const auto picture = wire::decode_threads(bytes);
+  if (!picture.ok()) return false;
+  Bytes again;
+  wire::encode_threads(*picture, again);
+  const auto same = wire::decode_threads(again);
+  TROCAR_ASSERT(same.ok() && *same == *picture);
+  return true;
 }
 
 // The blood of a snapshot. A state that is accepted is written as it was read.
@@ -424,6 +436,7 @@ constexpr Decoder kDecoders[] = {
     {"surface_codec", decode_surface},
     {"surface_slice", decode_surface_slice},
     {"blood", decode_blood},
+    {"threads", decode_threads},
     {"bleeding", decode_bleeding},
     {"handshake", decode_handshake},
     {"broadcast", decode_broadcast},

@@ -13,6 +13,7 @@
 #include "common/wire/haptic_messages.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
+#include "common/wire/thread_codec.h"
 #include "proto/fine_surface.pb.h"
 #include "proto/wire.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
@@ -128,6 +129,20 @@ void save_blood() {
   save("bleeding", "clipped", state);
 }
 
+void save_threads() {
+  wire::ThreadPicture picture{
+      .threads = {{.nodes = 40, .material = 2}, {.nodes = 4, .material = 0}},
+      .pegs = {{.from = {-900, 0, 0}, .to = {900, 0, 0}, .radius = 90}},
+      .places = {},
+      .is_joined = {}};
+  for (std::int32_t i = 0; i < 44; ++i) picture.places.push_back({31 * i, i * i / 4, -i});
+  picture.is_joined.assign(44, 1);
+  picture.is_joined[17] = picture.is_joined[39] = picture.is_joined[43] = 0;
+  Bytes payload;
+  wire::encode_threads(picture, payload);
+  save("threads", "cut", payload);
+}
+
 void save_datagram(const char* name, bool is_client, BytesView datagram) {
   Bytes bytes{static_cast<std::uint8_t>(is_client)};
   ByteWriter(bytes).put(static_cast<std::uint16_t>(datagram.size()));
@@ -236,6 +251,7 @@ int main(int argc, char** argv) {
   save_teaching();
   save_slices();
   save_blood();
+  save_threads();
   save_handshakes();
   save_dicom();
   const auto block = reduction::testing::block(3, 3, 3);

@@ -23,7 +23,7 @@ class BledRecording : public ::testing::Test {
     static const TemporaryFolder folder;
     static const std::string path = [] {
       auto file = folder.file("bled.mcap");
-      record_simulation(file, 0, true);
+      record_simulation(file, 0, {.bleeding = bleeding::Rules{}});
       return file;
     }();
     return path;
@@ -107,7 +107,7 @@ TEST_F(BledRecording, RulesThatCannotBeAreRefused) {
 // After the gap the blood goes on from the snapshot, and nothing differs.
 TEST_F(BledRecording, AfterAGapItGoesOnFromTheNextSnapshot) {
   const auto file = folder_.file("gap.mcap");
-  record_simulation(file, 1200, true);
+  record_simulation(file, 1200, {.bleeding = bleeding::Rules{}});
   const auto report = verify(file);
   EXPECT_EQ(report.verdict(), Verdict::NotVerified) << report.why();
   EXPECT_FALSE(report.first_difference);

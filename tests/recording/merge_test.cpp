@@ -38,7 +38,9 @@ const auto kAll = [](auto, auto&) { return true; };
 // A session in three parts, simulated once for all tests that do not change it.
 struct Parts {
   explicit Parts(bool bleeds) {
-    record_simulation(whole, 0, bleeds);
+    step::SceneRules rules;
+    if (bleeds) rules.bleeding.emplace();
+    record_simulation(whole, 0, rules);
     cut_off(whole, 0.45, first);
     go_on(first, whole, folder.file("full.mcap"), kRecordedTicks);
     cut_off(folder.file("full.mcap"), 0.6, second);

@@ -47,10 +47,11 @@ wire::HandReport report_until(std::uint64_t time_us) {
 
 }  // namespace
 
-void record_simulation(const std::string& path, Tick dropped_at, bool bleeds) {
+void record_simulation(const std::string& path, Tick dropped_at, const step::SceneRules& rules) {
   Beginning beginning;
-  if (bleeds) beginning.bleeding.emplace();
-  step::Simulation simulation(*catalogue::make_liver(800), 1, {.bleeding = beginning.bleeding});
+  beginning.bleeding = rules.bleeding;
+  beginning.threads = rules.threads;
+  step::Simulation simulation(*catalogue::make_liver(800), 1, rules);
   auto recorder = Recorder::create(path, simulation.organ(), simulation.layout(), beginning);
   ASSERT_TRUE(recorder.ok()) << recorder.error().message;
   Vec3f top{0, -1, 0};

@@ -12,6 +12,7 @@
 #include "common/base/bytes.h"
 #include "common/base/tick.h"
 #include "common/base/version.h"
+#include "server/tissue/step/tick.h"
 
 namespace google::protobuf {
 class Message;
@@ -27,8 +28,10 @@ inline constexpr Tick kSnapshotTicks[] = {808, 1608};
 inline constexpr std::uint64_t kClientStart_us = 5'000'000;
 inline constexpr Tick kFirstReportTick = 256;
 
-// dropped_at: a frame that is too large for the recorder's queue, or 0. bleeds: what is cut does.
-void record_simulation(const std::string& path, Tick dropped_at = 0, bool bleeds = false);
+// dropped_at: a frame that is too large for the recorder's queue, or 0. rules: those that the
+// recording keeps.
+void record_simulation(const std::string& path, Tick dropped_at = 0,
+                       const step::SceneRules& rules = {});
 
 // The file of a simulation that is recorded once in a process: to be read and copied only.
 const std::string& recorded_simulation();

@@ -117,7 +117,7 @@ TEST_F(Trim, FromItsBeginningItIsTheSameRecording) {
 
 TEST_F(Trim, ASessionThatBleedsVerifiesToo) {
   const auto bleeding = folder_.file("bleeding.mcap");
-  record_simulation(bleeding, 0, true);
+  record_simulation(bleeding, 0, {.bleeding = bleeding::Rules{}});
   const auto trimmed = trim(bleeding, to_, {.from = kFrom, .to = kTo});
   ASSERT_TRUE(trimmed.ok()) << trimmed.error().message;
   const auto report = verify_journal(to_);

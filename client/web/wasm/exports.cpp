@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "client/shape/noise.h"
+#include "client/shape/thread_mesh.h"
 #include "client/web/wasm/page_hand.h"
 #include "client/web/wasm/page_model.h"
 
@@ -21,6 +22,7 @@ constexpr std::size_t kMostInput = 16 * 1024 * 1024 + 4;
 
 Bytes input_bytes;
 std::vector<std::uint8_t> noise_texels;
+shape::MeshVertices thread_mesh;
 
 PageModel& model() {
   static PageModel the_model;
@@ -124,7 +126,7 @@ TROCAR_EXPORT(newest_server_us) double trocar_newest_server_us() {
   return newest == nullptr ? 0 : static_cast<double>(newest->server_time_us);
 }
 TROCAR_EXPORT(shown_tick) double trocar_shown_tick() {
-  return model().shown_tick();
+  return model().shown().tick();
 }
 
 TROCAR_EXPORT(update) int trocar_update(double now_ms, std::size_t triangle_budget, int overlay) {
@@ -271,6 +273,12 @@ TROCAR_EXPORT(lesson_target) const float* trocar_lesson_target() {
 // Vertices of all that is drawn; then mesh_vertices() says how many.
 TROCAR_EXPORT(drawing_at) const void* trocar_drawing_at() {
   return hand_out(model().drawing());
+}
+// Surgical thread is told likewise, with its pegs.
+TROCAR_EXPORT(threads_at) const void* trocar_threads_at() {
+  thread_mesh.clear();
+  shape::add_threads(model().shown().threads(), model().shown().thread_places(), thread_mesh);
+  return hand_out(thread_mesh);
 }
 TROCAR_EXPORT(attach) const float* trocar_attach(float x, float y, float z) {
   return model().attach({x, y, z});

@@ -80,8 +80,8 @@ class PageModel {
   const replica::Replica& replica() const { return *replica_; }
   // CRC-32 of the newest frame, computed anew from what is held; 0 before the first.
   std::uint32_t own_crc() const;
-  // Ticks by which the picture is behind frames without jitter.
-  double shown_tick() const { return shown_->tick(); }
+  // Returns what is shown between two frames.
+  const replica::InterpolatedSurface& shown() const { return *shown_; }
 
   // Computes the picture at `now_ns`. At most `triangle_budget` triangles where rounding would make
   // more. False until there is one.

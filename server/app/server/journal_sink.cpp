@@ -35,12 +35,13 @@ class RecordedSession : public JournalSink {
 
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::Continuation>& continues,
-    const std::optional<bleeding::Rules>& bleeding, const std::optional<secure::SigningKey>& key) {
+    const std::optional<journal::Continuation>& continues, const step::SceneRules& rules,
+    const std::optional<secure::SigningKey>& key) {
   if (path == "none") return std::unique_ptr<JournalSink>();
   recording::Beginning beginning;
   beginning.continues = continues;
-  beginning.bleeding = bleeding;
+  beginning.bleeding = rules.bleeding;
+  beginning.threads = rules.threads;
   beginning.key = key;
   auto recorder = recording::Recorder::create(path, organ, layout, beginning);
   if (!recorder) return recorder.error();

@@ -16,8 +16,8 @@
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
 #include "server/session/participants/roster.h"
-#include "server/tissue/bleeding/rules.h"
 #include "server/tissue/step/published_frame.h"
+#include "server/tissue/step/tick.h"
 
 namespace trocar::app {
 
@@ -47,11 +47,10 @@ class JournalSink {
 };
 
 // A journal at `path`, or none for "none" (then null). continues: with which journal's session it
-// goes on. bleeding: of a session that bleeds. key: signs the recording at its end.
+// goes on. rules: what of them a recording keeps. key: signs the recording at its end.
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::Continuation>& continues = {},
-    const std::optional<bleeding::Rules>& bleeding = {},
+    const std::optional<journal::Continuation>& continues = {}, const step::SceneRules& rules = {},
     const std::optional<secure::SigningKey>& key = {});
 
 // "./trocar-20261121T135400Z.mcap"

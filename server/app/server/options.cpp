@@ -14,6 +14,7 @@
 #include "server/app/config/place.h"
 #include "server/app/server/journal_sink.h"
 #include "server/tissue/step/simulation.h"
+#include "server/tissue/thread/rules_toml.h"
 
 namespace trocar::app {
 namespace {
@@ -264,6 +265,10 @@ void CommandLine::add_session_options() {
       ->type_name("NAME|FILE");
   app_.add_flag("--bleeding", options_.bleeds,
                 "cut tissue bleeds, also without a lesson that bleeds");
+  app_.add_option("--threads", options_.threads_file,
+                  "surgical thread lies beside the organ as this file says, such as "
+                  "deploy/threads/post.toml")
+      ->type_name("FILE");
   app_.add_option("--listen", listen_, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
@@ -385,14 +390,22 @@ Status read_lesson(ServerOptions& options) {
   return {};
 }
 
+Status read_threads(ServerOptions& options) {
+  if (options.threads_file.empty()) return {};
+  auto rules = thread::read_rules_file(options.threads_file);
+  if (!rules) return Error{rules.error().code, "--threads: " + rules.error().message};
+  options.threads = *std::move(rules);
+  return {};
+}
+
 }  // namespace
 
 Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   auto read = read_command_line<CommandLine>(argc, argv, kExampleFile);
   if (!read || !*read) return read;
   auto& options = **read;
-  if (const auto lesson = read_lesson(options); !lesson)
-    return Error{lesson.error().code, options.origins.placed(lesson.error().message)};
+  for (const auto& done : {read_lesson(options), read_threads(options)})
+    if (!done) return Error{done.error().code, options.origins.placed(done.error().message)};
   if (options.journal.empty()) options.journal = default_journal_path();
   return read;
 }

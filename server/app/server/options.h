@@ -11,6 +11,7 @@
 #include "server/app/server/access_options.h"
 #include "server/app/server/limit_options.h"
 #include "server/tissue/step/tick_report.h"
+#include "server/tissue/thread/rules.h"
 
 namespace trocar::app {
 
@@ -20,6 +21,8 @@ struct ServerOptions {
   std::string lesson_file;                  // empty: none
   std::optional<lesson::Lesson> lesson;     // read from it
   bool bleeds = false;                      // asked for, besides what a lesson says
+  std::string threads_file;                 // empty: none
+  std::optional<thread::Rules> threads;     // read from it
   std::string resume_file;                  // empty: a new session
   std::optional<bool> has_averaged_strain;  // empty: as the organ has it
   std::string address = "127.0.0.1";

@@ -186,7 +186,7 @@ Status Server::open() {
   if (!page) return page.error();
   page_ = std::move(*page);
   auto journal = open_journal(options_.journal, organ, layout, start_.continues,
-                              start_.simulation.rules().bleeding, start_.key);
+                              start_.simulation.rules(), start_.key);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 

@@ -37,7 +37,8 @@ Result<SessionStart> begin(const ServerOptions& options) {
   const auto* lesson = options.lesson ? &*options.lesson : nullptr;
   return SessionStart{.simulation = step::Simulation(
                           std::move(*organ), most_workers(options),
-                          {.bleeding = replication::bleeding_rules(lesson, options.bleeds)})};
+                          {.bleeding = replication::bleeding_rules(lesson, options.bleeds),
+                           .threads = options.threads})};
 }
 
 // Somebody who names an organ means that one.
@@ -88,6 +89,9 @@ Result<SessionStart> go_on(const ServerOptions& options) {
   if (options.bleeds && !start.simulation.rules().bleeding)
     return Error{ErrorCode::Usage, "--bleeding: the session of " + options.resume_file +
                                        " does not bleed, leave out --bleeding"};
+  if (options.threads && !start.simulation.rules().threads)
+    return Error{ErrorCode::Usage, "--threads: the session of " + options.resume_file +
+                                       " has no thread, leave out --threads"};
   return start;
 }
 

@@ -16,6 +16,7 @@ Result<std::unique_ptr<SimJournal>> SimJournal::create(const std::string& path,
                                                        const step::Simulation& simulation,
                                                        recording::Beginning beginning) {
   beginning.loads = simulation.loads().rules();
+  beginning.threads = simulation.rules().threads;
   auto recorder =
       recording::Recorder::create(path, simulation.organ(), simulation.layout(), beginning);
   if (!recorder) return recorder.error();

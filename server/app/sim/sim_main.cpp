@@ -234,9 +234,6 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
         ErrorCode::Usage,
         "--journal: recordings know no cutting = \"nakao\", which moves nodes of the mesh: "
         "remove one of the two"};
-  if (run.scenario().threads)
-    return Error{ErrorCode::Usage,
-                 "--journal: recordings do not hold threads yet: remove it, or each [[thread]]"};
   recording::Beginning beginning;
   beginning.starts_from_snapshot = run.scenario().run.starts_in_equilibrium;
   beginning.has_implicit_strain = run.has_implicit_strain();

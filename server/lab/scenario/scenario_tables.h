@@ -29,8 +29,5 @@ std::vector<DisplacementRule> read_displacements(tool::Document& document, tool:
 std::vector<ForceRule> read_forces(tool::Document& document, tool::TableReader& root);
 std::vector<TractionRule> read_tractions(tool::Document& document, tool::TableReader& root);
 RunRule read_run(tool::TableReader& reader);  // and finishes the reader
-// With pegs and floor; nothing: there is no thread.
-std::optional<thread::Rules> read_threads(tool::Document& document, tool::TableReader& root,
-                                          const std::optional<Vec3d>& gravity_m_s2);
 
 }  // namespace trocar::scenario

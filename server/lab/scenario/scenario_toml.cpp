@@ -2,6 +2,7 @@
 
 #include "common/tool/script_toml.h"
 #include "server/lab/scenario/scenario_tables.h"
+#include "server/tissue/thread/rules_toml.h"
 
 namespace trocar::scenario {
 namespace {
@@ -189,7 +190,7 @@ void read_scenario(tool::Document& document, tool::TableReader& root, Scenario& 
   if (!with("run", [&](tool::TableReader& r) { scenario.run = read_run(r); }))
     root.fail("run", "is missing, add [run] with seconds");
   scenario.run_place = place_of(root, "run");
-  scenario.threads = read_threads(document, root, scenario.gravity_m_s2);
+  scenario.threads = thread::read_rules(document, root, scenario.gravity_m_s2);
   const bool has_ticks = scenario.run.mode == RunMode::Dynamic &&
                          scenario.run.integrator == Integrator::Implicit &&
                          !scenario.run.starts_in_equilibrium;

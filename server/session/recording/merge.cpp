@@ -127,7 +127,8 @@ class Merger {
           const auto& topic = (*reader)->channels().at(message.channel_id).topic;
           const auto known = journal::topic_of(topic);
           if (known == JournalTopic::FrameState) state_tick = times.tick(message.log_time);
-          if (number > 0 && (known == JournalTopic::Organ || known == JournalTopic::Bleeding))
+          if (number > 0 && (known == JournalTopic::Organ || known == JournalTopic::Bleeding ||
+                             known == JournalTopic::Threads))
             return true;  // the first part has them
           has_drawn_ |= known == JournalTopic::Drawing;
           written =

@@ -41,6 +41,7 @@ constexpr RecordedText kTexts[] = {
     {"trocar.proto.SurfaceChange.region", TextKind::Harmless},
     {"trocar.proto.SurfaceTopology.organ_name", TextKind::Harmless},
     {"trocar.proto.TeachEvent.text", TextKind::Teaching},
+    {"trocar.proto.ThreadRules.Thread.name", TextKind::Harmless},
     {"trocar.proto.TieBand.name", TextKind::Harmless},
 };
 

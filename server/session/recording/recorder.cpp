@@ -8,6 +8,7 @@
 #include "server/organs/organ/organ_file.h"
 #include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/load_messages.h"
+#include "server/session/recording/thread_messages.h"
 #include "server/session/replication/messages.h"
 
 namespace trocar::recording {
@@ -16,7 +17,7 @@ namespace {
 std::size_t estimated_bytes(const step::PublishedFrame& frame) {
   std::size_t bytes = sizeof frame + frame.surface.size() * sizeof(wire::QuantisedVertex) +
                       frame.regions.size() * sizeof(std::uint16_t);
-  bytes += frame.blood.size();
+  bytes += frame.blood.size() + frame.threads.size();
   if (frame.snapshot) bytes += frame.snapshot->size();
   if (frame.change)
     bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
@@ -78,6 +79,12 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
     proto::BleedingRules rules;
     to_message(*beginning.bleeding, rules);
     if (auto s = (*writer)->write(journal::JournalTopic::Bleeding, begin_tick, now, rules); !s)
+      return s.error();
+  }
+  if (beginning.threads) {
+    proto::ThreadRules rules;
+    to_message(*beginning.threads, rules);
+    if (auto s = (*writer)->write(journal::JournalTopic::Threads, begin_tick, now, rules); !s)
       return s.error();
   }
   proto::SurfaceTopology topology;

@@ -43,6 +43,7 @@
 #include "server/tissue/bleeding/rules.h"
 #include "server/tissue/step/external_loads.h"
 #include "server/tissue/step/published_frame.h"
+#include "server/tissue/thread/rules.h"
 
 namespace trocar::recording {
 
@@ -58,6 +59,7 @@ struct Beginning {
   bool has_implicit_strain = false;                // of a scenario, see journal::SessionInfo
   std::optional<journal::Continuation> continues;  // with which journal's session it goes on
   std::optional<bleeding::Rules> bleeding;         // of a session that bleeds
+  std::optional<thread::Rules> threads;            // of one with surgical thread
   std::optional<secure::SigningKey> key;           // signs the recording at its end
 };
 

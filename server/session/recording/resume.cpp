@@ -11,6 +11,7 @@
 #include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/recorded_course.h"
 #include "server/session/recording/recorded_session.h"
+#include "server/session/recording/thread_messages.h"
 #include "server/session/recording/verify.h"
 
 namespace trocar::recording {
@@ -139,7 +140,9 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   if (!last) return last.error();
   auto bleeding = recorded_bleeding(journal, path);
   if (!bleeding) return bleeding.error();
-  step::SceneRules rules{.bleeding = std::move(*bleeding)};
+  auto threads = recorded_threads(journal, path);
+  if (!threads) return threads.error();
+  step::SceneRules rules{.bleeding = std::move(*bleeding), .threads = std::move(*threads)};
   ResumedSession session{.simulation = step::Simulation(std::move(*organ), options.workers, rules),
                          .continuation = {std::filesystem::path(path).filename().string(), *last}};
   const auto from = restore_before(*last, journal, path, session);

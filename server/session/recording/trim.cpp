@@ -79,6 +79,10 @@ class Trimmer {
     if (!rules) return rules.error();
     if (*rules)
       if (auto s = write(JournalTopic::Bleeding, cut_.begin, **rules); !s) return s;
+    auto threads = journal_.threads();
+    if (!threads) return threads.error();
+    if (*threads)
+      if (auto s = write(JournalTopic::Threads, cut_.begin, **threads); !s) return s;
     if (auto s = write_topology(session); !s) return s;
     if (auto s = write_last(JournalTopic::Participants); !s) return s;
     if (auto s = write_last(JournalTopic::Drawing); !s) return s;

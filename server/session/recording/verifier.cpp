@@ -162,6 +162,7 @@ bool Verifier::check(std::string_view topic, BytesView bytes) {
       break;
     case JournalTopic::Loads:  // the simulation has them, and these
     case JournalTopic::Bleeding:
+    case JournalTopic::Threads:
       if (message_counts_.find(topic)->second > 1)
         add_reason(fmt::format("{}: there are others, after tick {}", topic, next_tick_ - 1));
       break;

@@ -10,6 +10,7 @@
 #include "common/base/workers.h"
 #include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/recorded_session.h"
+#include "server/session/recording/thread_messages.h"
 #include "server/session/recording/verifier.h"
 
 namespace trocar::recording {
@@ -56,6 +57,8 @@ Result<VerifyReport> verify_journal(const std::string& path,
 
   auto bleeding = recorded_bleeding(**journal, path);
   if (!bleeding) return bleeding.error();
+  auto threads = recorded_threads(**journal, path);
+  if (!threads) return threads.error();
 
   VerifyReport report;
   const bool lacks_loads = info.has_external_loads && loads->empty();
@@ -88,7 +91,8 @@ Result<VerifyReport> verify_journal(const std::string& path,
   if (!info.is_finished && (!is_changed || whole.damaged_chunks > 0))
     report.reasons.push_back("it has no end: " + report.container);
 
-  step::SceneRules rules{.loads = std::move(*loads), .bleeding = std::move(*bleeding)};
+  step::SceneRules rules{
+      .loads = std::move(*loads), .bleeding = std::move(*bleeding), .threads = std::move(*threads)};
   if (info.has_implicit_strain) rules.strain_scheme = dynamics::StrainScheme::Implicit;
   step::Simulation simulation(std::move(*organ), usable_workers(), std::move(rules));
   Verifier verifier(info, std::move(simulation), report);

@@ -150,6 +150,7 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
     begin = end;
   }
   wire::write(frame.figures, state);
+  if (!frame.threads.empty()) state.set_threads(frame.threads.data(), frame.threads.size());
 }
 
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {

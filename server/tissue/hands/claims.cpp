@@ -166,7 +166,9 @@ void ClaimTable::take_over(Tick tick, const ClaimRequest& request,
 void ClaimTable::decide_grasp(Tick tick, const ClaimRequest& request,
                               std::span<const ClaimRequest> requests,
                               std::vector<ClaimEvent>& events) {
-  if (request.core.empty())
+  if (request.core.empty() && request.thread.holder.is_valid())
+    return refuse(tick, request, ClaimOutcome::RefusedHeld, request.thread.holder, events);
+  if (request.core.empty() && !request.thread.is_held)
     return refuse(tick, request, ClaimOutcome::RefusedNothingInReach, {}, events);
   if (const auto holder = holder_of(tick, request, requests); holder.is_valid())
     return refuse(tick, request, ClaimOutcome::RefusedHeld, holder, events);

@@ -41,12 +41,20 @@ struct ClaimEvent {
   ToolSlot holder;  // RefusedHeld: who holds it; TakenOver: who took it; else invalid
 };
 
+// Jaws have this of surgical thread, whose own rules say which stretch each tool holds
+// (server/tissue/thread/grips.h). Jaws with thread between them hold no tissue.
+struct ThreadGrip {
+  bool is_held = false;
+  ToolSlot holder;  // who holds the thread that these jaws closed on in vain; invalid: nobody
+};
+
 // A tool asks for this at the end of a tick.
 struct ClaimRequest {
   ToolSlot tool;
   tool::Verb verb = tool::Verb::None;
   Tick last_sample_tick = 0;
   std::span<const NodeIndex> core;  // of a grasp, a cut: the nodes in reach, ascending
+  ThreadGrip thread;
 };
 
 enum class ClaimPhase : std::uint8_t {

@@ -63,8 +63,8 @@ EquilibriumReport Equilibrium::find(const dynamics::ExternalLoads& loads, const 
     auto& events = context().outbox.claim_events;
     state().proxies.update(contact.found, world, state().tools);
     events.clear();
-    contact::update_claims(world, state().tools, contact.found, contact.requests, state().claims,
-                           state().grasps, events);
+    contact::update_claims(world, state().tools, contact.found, {}, contact.requests,
+                           state().claims, state().grasps, events);
   }
   simulation_.loads().measure(context().solve.solver, context().contact.found);
   report.is_converged &= change <= kContactChange_m;

@@ -66,6 +66,7 @@ struct PublishedFrame {
   // It has a level per slot where the session bleeds (common/wire/blood_codec.h), and else none.
   wire::BloodLevels blood;
   std::uint32_t blood_crc = 0;
+  Bytes threads;  // where surgical thread is (common/wire/thread_codec.h); empty: there is none
   std::vector<std::uint16_t>
       regions;                   // per vertex slot: 0 not active, else merged region 1, 2, ...
   std::vector<ToolFrame> tools;  // occupied tools, by slot

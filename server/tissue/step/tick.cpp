@@ -37,6 +37,7 @@ bool hand_over(const hands::Handover& handover, State& state, Outbox& outbox) {
   state.claims.hand_over(handover.from, handover.to, tick, outbox.claim_events);
   state.grasps.hand_over(handover.from, handover.to);
   state.proxies.hand_over(handover.from, handover.to);
+  if (state.threads) state.threads->hand_over(handover.from, handover.to);
   return true;
 }
 
@@ -398,8 +399,9 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   end(Stage::Cut);
   if (context.threads) move_threads(state, *context.threads);
   end(Stage::Solve);
-  contact::update_claims(world, state.tools, contacts, context.contact.requests, state.claims,
-                         state.grasps, context.outbox.claim_events);
+  contact::update_claims(world, state.tools, contacts, thread_grips(context.threads.get()),
+                         context.contact.requests, state.claims, state.grasps,
+                         context.outbox.claim_events);
   end(Stage::Claims);
   report.state_hash = hash_of(state, context.hasher);
   report.faults = faults_of(report);
@@ -409,7 +411,7 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   if (!publishes_frame(world.tick)) return;
   context.frame = publish(state, contacts, queue, context.solve.solver.tissue(), report,
                           context.touches, context.surface_displacements, context.outbox);
-  if (context.threads) add_pulls(*context.threads, *context.frame);
+  if (context.threads) publish_threads(*state.threads, *context.threads, *context.frame);
   end(Stage::Publish);
   if (!context.bleed) return;
   bleed(state.tools, state.cuts.layout(), *state.blood, *context.bleed, *context.frame);

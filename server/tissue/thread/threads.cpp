@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace trocar::thread {
 
@@ -25,6 +26,13 @@ void Threads::let_go(const Threads& now) {
   was_closed = now.was_closed;
   tool_poses = now.tool_poses;
   has_pose = now.has_pose;
+}
+
+void Threads::hand_over(ToolSlot from, ToolSlot to) {
+  for (auto& tool : holds.tools) tool = tool == from ? to : tool == to ? from : tool;
+  std::swap(was_closed[from.value], was_closed[to.value]);
+  std::swap(tool_poses[from.value], tool_poses[to.value]);
+  std::swap(has_pose[from.value], has_pose[to.value]);
 }
 
 void Threads::visit_state(world::StateArchive& archive) {

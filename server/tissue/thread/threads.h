@@ -53,6 +53,8 @@ struct Threads {
 
   // The threads of a mark that was returned to: tools that hold something now have to open first.
   void let_go(const Threads& now);
+  // Two tools have changed hands, with what they hold.
+  void hand_over(ToolSlot from, ToolSlot to);
 
   void visit_state(world::StateArchive& archive);
 

@@ -71,6 +71,7 @@ export interface Exports {
   hand_sample(hand: number, nowMs: number): number;
   lesson_target(): number;
   drawing_at(): number;
+  threads_at(): number;
   attach(x: number, y: number, z: number): number;
   make_tool(
     radiusM: number,

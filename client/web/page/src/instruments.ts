@@ -1,5 +1,5 @@
-// These are drawn beside the organ: instruments with their arrows, pointers, and the drawing
-// on the organ.
+// These are drawn beside the organ: instruments with their arrows, surgical thread, pointers, and
+// the drawing on the organ.
 
 import {
   BufferAttribute,
@@ -66,6 +66,7 @@ export class Instruments {
   private readonly drawnTools = new Map<number, DrawnTool>();
   private readonly drawnPointers = new Map<number, DrawnPointer>();
   private drawing: Mesh | null = null;
+  private threads: Mesh | null = null;
 
   // `onCanvas` says where in `labels` a point lies that `pane` has projected.
   constructor(
@@ -196,7 +197,8 @@ export class Instruments {
       ...this.replica.pointers(),
       ...(target ? [{ participant: kLessonPoint, position: target }] : []),
     ]);
-    this.placeDrawing();
+    this.drawing = this.placeMesh(this.drawing, this.replica.drawing(), 0.8);
+    this.threads = this.placeMesh(this.threads, this.replica.threads(), 0);
   }
   private placeTools(tools: Tool[], seconds: number, showsArrows: boolean): void {
     const shown = new Set(tools.map(t => t.slot));
@@ -298,29 +300,29 @@ export class Instruments {
     }
   }
 
-  private placeDrawing(): void {
-    const plain = this.replica.drawing(),
-      count = plain.positions.length / 3,
-      known = this.drawing?.geometry.getAttribute('position');
-    if (this.drawing && known?.count !== count) {
-      this.scene.remove(this.drawing);
-      this.drawing.geometry.dispose();
-      this.drawing = null;
+  // Shows a mesh of which there is another in each picture; null: nothing is there.
+  private placeMesh(known: Mesh | null, plain: PlainMesh, glow: number): Mesh | null {
+    const count = plain.positions.length / 3;
+    if (known && known.geometry.getAttribute('position').count !== count) {
+      this.scene.remove(known);
+      known.geometry.dispose();
+      known = null;
     }
-    if (count === 0) return;
-    if (!this.drawing) {
-      this.drawing = this.meshOf(plain, { value: 1 }, 0.8);
-      this.scene.add(this.drawing);
-      return;
+    if (count === 0) return null;
+    if (!known) {
+      known = this.meshOf(plain, { value: 1 }, glow);
+      this.scene.add(known);
+      return known;
     }
     for (const [name, values] of [
       ['position', plain.positions],
       ['normal', plain.normals],
     ] as const) {
-      const attribute = this.drawing.geometry.getAttribute(name) as BufferAttribute;
+      const attribute = known.geometry.getAttribute(name) as BufferAttribute;
       attribute.array.set(values);
       attribute.needsUpdate = true;
     }
+    return known;
   }
 
   placeLabels(tools: Tool[]): void {

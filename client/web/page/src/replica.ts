@@ -401,6 +401,10 @@ export class Replica {
   drawing(): Mesh {
     return this.mesh(this.e.drawing_at());
   }
+  // Surgical thread, and the pegs that stand there.
+  threads(): Mesh {
+    return this.mesh(this.e.threads_at());
+  }
   // How the server is told of a place on the organ; null: there is none yet.
   attach(place: Vec3): { triangle: number; weights: [number, number] } | null {
     const at = this.e.attach(...place);

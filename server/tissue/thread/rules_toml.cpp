@@ -1,15 +1,21 @@
-// Surgical thread, and the pegs and floor that it meets, in a scenario's TOML form.
+#include "server/tissue/thread/rules_toml.h"
 
-#include "server/lab/scenario/scenario_tables.h"
+#include "common/tool/toml_reader.h"
 
-namespace trocar::scenario {
+namespace trocar::thread {
 namespace {
+
+constexpr std::size_t kFileLimitBytes = 1024 * 1024;
+
+std::string table_entry(const char* table, std::size_t i) {
+  return std::string(table) + "[" + std::to_string(i) + "]";
+}
 
 Vec3d read_near(tool::TableReader& reader, std::string_view key) {
   const auto mm = reader.vector(key);
   if (!mm)
     reader.fail_missing(key, "write [x, y, z]");
-  else if (length(*mm) > thread::kMostM * 1e3)
+  else if (length(*mm) > kMostM * 1e3)
     reader.fail(key, "is more than 2 m away: is it in millimetres?");
   return mm.value_or(Vec3d{}) * 1e-3;
 }
@@ -26,27 +32,26 @@ struct EndKeys {
   std::string held, load, velocity, until;
 };
 
-thread::End read_end(tool::TableReader& reader, const EndKeys& keys) {
-  thread::End end;
+End read_end(tool::TableReader& reader, const EndKeys& keys) {
+  End end;
   end.is_held = reader.boolean(keys.held).value_or(false);
-  const auto load = read_limited(reader, keys.load, thread::kMostLoadN, "N");
-  const auto velocity = read_limited(reader, keys.velocity, thread::kMostSpeedM_s * 1e3, "mm/s");
+  const auto load = read_limited(reader, keys.load, kMostLoadN, "N");
+  const auto velocity = read_limited(reader, keys.velocity, kMostSpeedM_s * 1e3, "mm/s");
   if (load && end.is_held) reader.fail(keys.load, "is of a free end, remove it or " + keys.held);
   if (velocity && !end.is_held)
     reader.fail(keys.velocity, "is of a held end, write " + keys.held + " = true");
   end.load_n = load.value_or(Vec3d{});
   end.velocity_m_s = velocity.value_or(Vec3d{}) * 1e-3;
-  const auto until = reader.number(keys.until, 0, thread::kMostSeconds);
+  const auto until = reader.number(keys.until, 0, kMostSeconds);
   if (until && !load && !velocity)
     reader.fail(keys.until, "needs " + keys.load + " or " + keys.velocity);
-  end.until_s = until.value_or(velocity ? thread::kMostSeconds : 0);
+  end.until_s = until.value_or(velocity ? kMostSeconds : 0);
   return end;
 }
 
-thread::ThreadRule read_thread(tool::Document& document, tool::TableReader& reader,
-                               const std::vector<thread::ThreadRule>& before) {
-  using thread::Material, thread::Size;
-  thread::ThreadRule rule;
+ThreadRule read_thread(tool::Document& document, tool::TableReader& reader,
+                       const std::vector<ThreadRule>& before) {
+  ThreadRule rule;
   rule.name = reader.string("name").value_or("thread" + std::to_string(before.size()));
   for (const auto& other : before)
     if (other.name == rule.name) reader.fail("name", "is that of another thread, change one");
@@ -78,12 +83,11 @@ thread::ThreadRule read_thread(tool::Document& document, tool::TableReader& read
   return rule;
 }
 
-thread::Peg read_peg(tool::TableReader& reader) {
-  thread::Peg peg;
+Peg read_peg(tool::TableReader& reader) {
+  Peg peg;
   peg.from_m = read_near(reader, "from_mm");
   peg.to_m = read_near(reader, "to_mm");
-  const auto radius =
-      reader.number("radius_mm", thread::kLeastPegRadiusM * 1e3, thread::kMostPegRadiusM * 1e3);
+  const auto radius = reader.number("radius_mm", kLeastPegRadiusM * 1e3, kMostPegRadiusM * 1e3);
   if (radius) peg.radius_m = *radius * 1e-3;
   peg.friction = reader.number("friction", 0, 2).value_or(peg.friction);
   reader.finish();
@@ -92,10 +96,10 @@ thread::Peg read_peg(tool::TableReader& reader) {
 
 }  // namespace
 
-std::optional<thread::Rules> read_threads(tool::Document& document, tool::TableReader& root,
-                                          const std::optional<Vec3d>& gravity_m_s2) {
-  thread::Rules rules;
-  const auto threads = limited_tables(root, "thread"), pegs = limited_tables(root, "peg");
+std::optional<Rules> read_rules(tool::Document& document, tool::TableReader& root,
+                                const std::optional<Vec3d>& gravity_m_s2) {
+  Rules rules;
+  const auto threads = root.tables("thread"), pegs = root.tables("peg");
   for (std::size_t i = 0; i < threads.size() && document.ok(); ++i) {
     tool::TableReader reader(document, *threads[i], table_entry("thread", i));
     rules.threads.push_back(read_thread(document, reader, rules.threads));
@@ -106,7 +110,7 @@ std::optional<thread::Rules> read_threads(tool::Document& document, tool::TableR
   }
   if (const auto* table = root.table("floor"); table != nullptr && document.ok()) {
     tool::TableReader reader(document, *table, "floor");
-    const auto y_mm = reader.number("y_mm", -thread::kMostM * 1e3, thread::kMostM * 1e3);
+    const auto y_mm = reader.number("y_mm", -kMostM * 1e3, kMostM * 1e3);
     if (!y_mm) reader.fail_missing("y_mm", "write how high it is, such as -50");
     rules.floor_y_m = y_mm.value_or(0) * 1e-3;
     reader.finish();
@@ -118,9 +122,23 @@ std::optional<thread::Rules> read_threads(tool::Document& document, tool::TableR
   }
   if (gravity_m_s2) rules.gravity_m_s2 = *gravity_m_s2;
   if (!document.ok()) return std::nullopt;
-  if (const auto valid = thread::validate(rules); !valid)
-    root.fail("thread", valid.error().message);
+  if (const auto valid = validate(rules); !valid) root.fail("thread", valid.error().message);
   return rules;
 }
 
-}  // namespace trocar::scenario
+Result<Rules> read_rules_file(const std::filesystem::path& path) {
+  const auto text = tool::read_text_file(path, kFileLimitBytes, "thread");
+  if (!text) return text.error();
+  tool::Document document(path.string());
+  const auto table = tool::parse_toml(document, *text, path.string(), kFileLimitBytes, "thread",
+                                      "deploy/threads/post.toml");
+  if (!table) return document.error();
+  tool::TableReader root(document, *table, "");
+  const auto rules = read_rules(document, root, std::nullopt);
+  root.finish();
+  if (document.ok() && !rules) root.fail_missing("thread", "write [[thread]] and its points");
+  if (!document.ok()) return document.error();
+  return *rules;
+}
+
+}  // namespace trocar::thread
