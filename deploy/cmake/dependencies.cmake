@@ -16,7 +16,6 @@ find_package(DCMTK REQUIRED CONFIG)
 find_package(OpenSSL 3.0 REQUIRED)
 # Only its libraries: the definition that comes with them would keep out the precompiled headers.
 pkg_check_modules(avahi REQUIRED avahi-client)
-pkg_check_modules(curl REQUIRED IMPORTED_TARGET libcurl)
 pkg_check_modules(qrencode REQUIRED IMPORTED_TARGET libqrencode)
 # Halls do without it.
 pkg_check_modules(nats IMPORTED_TARGET libnats)

@@ -1,6 +1,6 @@
 #pragma once
 
-// trocar-journal push: recordings to S3-compatible storage.
+// trocar-journal push: recordings to S3-compatible storage, or to any that rclone knows.
 
 #include <cstdint>
 #include <string>
@@ -13,7 +13,7 @@ namespace trocar::app {
 
 struct PushCommand {
   std::string path;  // a recording, or a folder of them
-  std::string url;   // s3://bucket/prefix
+  std::string url;   // s3://bucket/prefix, or REMOTE:path
   std::string endpoint, region;
   std::uint32_t part_mb = 16;
   bool allows_plain = false;
