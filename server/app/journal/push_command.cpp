@@ -25,7 +25,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostSaid = 64u << 10, kMostReason = 300;
+// rclone says a line for each part of a file, of which there are 10,000 at most.
+constexpr std::size_t kMostSaid = 4u << 20, kMostReason = 300;
+constexpr std::uintmax_t kTakesLong = 16u << 20;  // bytes
 
 // host: a name or an address, one of version 6 in brackets.
 bool is_this_machine(std::string host) {
@@ -130,6 +132,10 @@ Status push_one(const fs::path& file, const fs::path& name, const std::string& d
       "--log-level DEBUG --retries 1 --low-level-retries 3 --contimeout 10s --timeout 1m --");
   for (std::string word; fixed >> word;) command.words.push_back(word);
   command.words.insert(command.words.end(), {folder, to});
+  std::error_code unknown;
+  if (const auto bytes = fs::file_size(file, unknown); !unknown && bytes > kTakesLong)
+    std::fprintf(stderr, "%s: %.0f MB are on their way\n", name.c_str(),
+                 static_cast<double>(bytes) * 1e-6);
   auto child = process::Child::start(command);
   if (!child)
     return Error{child.error().code, child.error().message +

@@ -7,7 +7,9 @@ namespace trocar::propagation {
 using world::Boundary;
 using world::NodeClass;
 
-void ActiveSet::collect(const PropagationQueue& queue, Boundary boundary, world::World& world) {
+void ActiveSet::collect(const PropagationQueue& queue, std::span<const NodeIndex> pressed,
+                        Boundary boundary, world::World& world) {
+  pressed_count_ = 0;
   if (boundary == Boundary::Whole) return collect_whole(world);
   std::swap(nodes_, before_);
   nodes_.clear();
@@ -27,15 +29,23 @@ void ActiveSet::collect(const PropagationQueue& queue, Boundary boundary, world:
     has_history_ = true;
   }
   world.boundary = boundary;
-  for (const auto node : queue.nodes()) {
-    if (world.node_classes[node.value] == NodeClass::Fixed) continue;
+  is_pressed_.resize(world.node_count());
+  is_pressed_.begin();
+  const auto add = [&](NodeIndex node) {
+    if (world.node_classes[node.value] == NodeClass::Fixed) return;
     world.node_classes[node.value] = NodeClass::Active;
     world.quiet_ticks[node.value] = 0;
     nodes_.push_back(node);
-  }
+  };
+  for (const auto node : pressed)
+    if (is_pressed_.insert(node.value)) add(node);
+  pressed_count_ = nodes_.size();
+  for (const auto node : queue.nodes())
+    if (!is_pressed_.has(node.value)) add(node);
   const auto queued = nodes_.size();
   for (const auto node : before_)
-    if (world.node_classes[node.value] == NodeClass::Active && !queue.contains(node))
+    if (world.node_classes[node.value] == NodeClass::Active && !queue.contains(node) &&
+        !is_pressed_.has(node.value))
       nodes_.push_back(node);
   std::sort(nodes_.begin() + static_cast<std::ptrdiff_t>(queued), nodes_.end());
 }
@@ -61,7 +71,7 @@ std::span<const NodeIndex> ActiveSet::settle(const PropagationQueue& queue,
   const auto enough = world.boundary == Boundary::Graded ? linger_ticks : kQuietTicks;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const auto n = nodes_[i].value;
-    if (queue.contains(nodes_[i])) continue;
+    if (i < pressed_count_ || queue.contains(nodes_[i])) continue;
     const bool is_quiet = world.boundary == Boundary::Graded ||
                           (residuals_n[i] < kQuietResidualNewton &&
                            below(world.velocities[n], kQuietSpeedMetresPerSecond) &&

@@ -1,6 +1,7 @@
 #pragma once
 
 // The solver sweeps these nodes most: the queue, then nodes that have left it a short while ago.
+// Pressed nodes are swept as touched ones, but no force spreads from them in layers.
 //
 // Boundary::Frozen (the papers'): all other nodes stand still. A node that left the queue goes on
 // being swept and stops only when, for 100 ticks in a row, its residual force, speed and
@@ -13,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/stamps.h"
 #include "server/tissue/propagation/queue.h"
 #include "server/tissue/world/world.h"
 
@@ -30,15 +32,20 @@ class ActiveSet {
     nodes_.reserve(node_count);
     before_.reserve(node_count);
     settled_.reserve(node_count);
+    is_pressed_.resize(node_count);
   }
 
   // Classes were changed by somebody else.
   void forget() { has_history_ = false; }
 
-  // Sets classes of queued nodes to Active, of all nodes for Boundary::Whole. Sweep order: queue
-  // order, then lingering nodes ascending; fixed nodes are left out.
-  void collect(const PropagationQueue& queue, world::Boundary boundary, world::World& world);
+  // Sets classes of queued and of pressed nodes to Active, of all nodes for Boundary::Whole. Sweep
+  // order: pressed nodes ascending, the others in queue order, then lingering nodes ascending;
+  // fixed nodes are left out. pressed: distinct.
+  void collect(const PropagationQueue& queue, std::span<const NodeIndex> pressed,
+               world::Boundary boundary, world::World& world);
   std::span<const NodeIndex> nodes() const { return nodes_; }
+  // Returns how many of nodes() tissue presses: the first.
+  std::size_t pressed_count() const { return pressed_count_; }
 
   // After the solve: counts ticks of lingering nodes (`residuals_n`: per entry of nodes()) and
   // lets go of those that are due: Graded: after linger_ticks. Returns the nodes whose displacement
@@ -51,6 +58,8 @@ class ActiveSet {
   void collect_whole(world::World& world);
 
   std::vector<NodeIndex> nodes_, before_, settled_;
+  std::size_t pressed_count_ = 0;
+  Stamps is_pressed_;  // per node
   bool has_history_ = false;
 };
 

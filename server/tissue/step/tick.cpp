@@ -65,18 +65,25 @@ ContactReport report_of(const contact::ContactList& found, const State& state) {
 
 // Nodes that enter the queue are activated in the world.
 wire::NearFigures fill_queue(const contact::ContactList& contacts, const ExternalLoads* loads,
-                             const TickDecisions& decisions, world::World& world, NearWork& near) {
+                             const TickDecisions& decisions, bool has_tension, world::World& world,
+                             NearWork& near) {
   auto& seeds = near.seeds;
-  seeds.assign(kMaxTools + 1, {});
+  seeds.assign(kMaxTools, {});
   for (const auto& tool : contacts.tools) seeds[tool.tool.value] = contacts.seeds_of(tool);
-  seeds.back() = contacts.self_seeds;
+  // The surroundings of pairs are swept more where all else stands still, and where tension keeps
+  // wounds from coming to rest. Else there are too many while people cut.
+  const std::span<const NodeIndex> pressed(contacts.self_seeds);
+  const bool spreads =
+      decisions.boundary != world::Boundary::Graded || (has_tension && contacts.tools.empty());
+  if (spreads) seeds.push_back(pressed);
   if (loads != nullptr) seeds.insert(seeds.end(), loads->seeds().begin(), loads->seeds().end());
   // However little else there is room for, every touched or loaded node is in the queue.
   std::size_t touched = 0;
   for (const auto& nodes : seeds) touched += nodes.size();
   const auto node_limit = std::max(decisions.node_limit, static_cast<std::uint32_t>(touched));
   near.queue.fill(near.neighbours, seeds, {decisions.depth_limit, node_limit});
-  near.active.collect(near.queue, decisions.boundary, world);
+  near.active.collect(near.queue, spreads ? std::span<const NodeIndex>{} : pressed,
+                      decisions.boundary, world);
   return {.active_nodes = static_cast<std::uint32_t>(near.active.nodes().size()),
           .queue_nodes = static_cast<std::uint32_t>(near.queue.nodes().size()),
           .node_limit = decisions.node_limit,
@@ -84,8 +91,10 @@ wire::NearFigures fill_queue(const contact::ContactList& contacts, const Externa
 }
 
 // Swept nodes stand by layer, those that have left the queue last. Returns how many each layer has.
-LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::PropagationQueue& queue,
-                       const TickDecisions& decisions, std::span<dynamics::SweepBand> bands) {
+LayerCounts find_bands(const propagation::ActiveSet& active,
+                       const propagation::PropagationQueue& queue, const TickDecisions& decisions,
+                       std::span<dynamics::SweepBand> bands) {
+  const auto nodes = active.nodes();
   LayerCounts layer_nodes{};
   if (decisions.boundary == world::Boundary::Whole) {  // No layer has less than another.
     std::ranges::fill(bands, dynamics::SweepBand{nodes.size(), decisions.sweeps});
@@ -93,14 +102,17 @@ LayerCounts find_bands(std::span<const NodeIndex> nodes, const propagation::Prop
     return layer_nodes;
   }
   const auto layer_of = [&queue](NodeIndex node) { return queue.layer_of(node); };
+  const auto unpressed = nodes.subspan(active.pressed_count());
   const auto sweeps = sweeps_of_layers(decisions);
   std::size_t begin = 0;
   for (std::size_t layer = 0; layer < kSweepLayers; ++layer) {
     const bool is_last = layer + 1 == kSweepLayers;
     const auto end =
-        is_last ? nodes.size()
-                : static_cast<std::size_t>(std::ranges::upper_bound(nodes, layer, {}, layer_of) -
-                                           nodes.begin());
+        is_last
+            ? nodes.size()
+            : active.pressed_count() +
+                  static_cast<std::size_t>(
+                      std::ranges::upper_bound(unpressed, layer, {}, layer_of) - unpressed.begin());
     bands[layer] = {end, sweeps[layer]};
     layer_nodes[layer] = static_cast<std::uint32_t>(end - begin);
     begin = end;
@@ -184,7 +196,7 @@ SolveReport solve(const contact::ContactList& contacts, bool may_rest,
   auto& active = near.active;
   const auto& queue = near.queue;
   const auto nodes = active.nodes();
-  const auto layer_nodes = find_bands(nodes, queue, decisions, work.bands);
+  const auto layer_nodes = find_bands(active, queue, decisions, work.bands);
   auto settings = settings_of(decisions, work);
   const bool has_untouched_wounds = contacts.tools.empty() && !world.origins.empty();
   if (may_rest && has_untouched_wounds && !(settings.residual_tolerance_n > 0))
@@ -387,7 +399,8 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   wake_touched(has_rest, decisions.policy.has_self_contact, state, context.pieces, context.contact);
   report.contact = report_of(contacts, state);
   end(Stage::Contacts);
-  report.near = fill_queue(contacts, loads, decisions, world, context.near);
+  report.near =
+      fill_queue(contacts, loads, decisions, context.solve.has_tension, world, context.near);
   end(Stage::Queue);
   report.solve = solve_awake(contacts, has_rest, decisions, loads, state, context);
   report.ties = follow_ties(decisions.waiting_tools, state, context);
