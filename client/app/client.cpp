@@ -275,16 +275,8 @@ Result<ExitCode> Run::conclude(const Status& outcome) {
     log::info("left: {}", exit_reason_);
     return ExitCode::Ok;
   }
-  switch (source_.close_reason().kind) {
-    case replica::CloseKind::Refused:
-      return Error{ErrorCode::Refused, exit_reason_};
-    case replica::CloseKind::Unreachable:
-    case replica::CloseKind::Lost:
-      return Error{ErrorCode::ResourceMissing, exit_reason_};
-    case replica::CloseKind::None:
-    case replica::CloseKind::Ended:
-      break;
-  }
+  const replica::CloseReason reason{source_.close_reason().kind, exit_reason_};
+  if (const auto ending = net::ending_of(reason); !ending) return ending.error();
   log::info("session ended: {}", exit_reason_);
   return ExitCode::Ok;
 }

@@ -176,17 +176,20 @@ Status Bus::create_topics(const BusArm& arm) {
   const Qos latched = make_qos(1, true);
   int failure = 0;
   std::string failed;
-  const auto topic = [&](const char* name, const dds_topic_descriptor_t& type) {
-    const std::string full = "rt/" + arm.name + "/" + name;
-    const auto made = dds_create_topic(participant_, &type, full.c_str(), nullptr, nullptr);
-    if (made < 0) failure = made, failed = full;
+  const auto note = [&](const char* name, dds_entity_t made) {
+    if (made < 0 && failure == 0) failure = made, failed = arm.name + "/" + name;
     return made;
   };
+  const auto topic = [&](const char* name, const dds_topic_descriptor_t& type) {
+    const std::string full = "rt/" + arm.name + "/" + name;
+    return note(name, dds_create_topic(participant_, &type, full.c_str(), nullptr, nullptr));
+  };
   const auto writer = [&](const char* name, const dds_topic_descriptor_t& type, const Qos& qos) {
-    return dds_create_writer(participant_, topic(name, type), qos.get(), nullptr);
+    return note(name, dds_create_writer(participant_, topic(name, type), qos.get(), nullptr));
   };
   const auto reader = [&](const char* name, const dds_topic_descriptor_t& type, const Qos& qos) {
-    const auto made = dds_create_reader(participant_, topic(name, type), qos.get(), nullptr);
+    const auto made =
+        note(name, dds_create_reader(participant_, topic(name, type), qos.get(), nullptr));
     dds_set_status_mask(made, DDS_DATA_AVAILABLE_STATUS);
     dds_waitset_attach(waitset_, made, 0);
     return made;

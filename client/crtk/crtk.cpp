@@ -166,21 +166,6 @@ std::vector<BusArm> bus_arms(const std::vector<ArmOptions>& arms) {
   return all;
 }
 
-Result<ExitCode> outcome_of(const replica::CloseReason& reason) {
-  switch (reason.kind) {
-    case replica::CloseKind::Refused:
-      return Error{ErrorCode::Refused, reason.text};
-    case replica::CloseKind::Unreachable:
-    case replica::CloseKind::Lost:
-      return Error{ErrorCode::ResourceMissing, reason.text};
-    case replica::CloseKind::None:
-    case replica::CloseKind::Ended:
-      break;
-  }
-  log::info("the session is over: {}", reason.text);
-  return ExitCode::Ok;
-}
-
 }  // namespace
 
 void install_signal_handlers() {
@@ -210,7 +195,9 @@ Result<ExitCode> run_crtk(const CrtkOptions& options) {
     if (!robot.turn()) {
       const auto reason = robot.closed();
       robot.leave("the session of " + reason.text);
-      return outcome_of(reason);
+      if (const auto ending = net::ending_of(reason); !ending) return ending.error();
+      log::info("the session is over: {}", reason.text);
+      return ExitCode::Ok;
     }
   robot.leave(stop_requested != 0 ? "stopped by a signal" : "end of --seconds");
   return ExitCode::Ok;

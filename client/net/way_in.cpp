@@ -41,4 +41,18 @@ Status set_security(const WayIn& way, NetSourceOptions& connection) {
   return {};
 }
 
+Status ending_of(const replica::CloseReason& reason) {
+  switch (reason.kind) {
+    case replica::CloseKind::Refused:
+      return Error{ErrorCode::Refused, reason.text};
+    case replica::CloseKind::Unreachable:
+    case replica::CloseKind::Lost:
+      return Error{ErrorCode::ResourceMissing, reason.text};
+    case replica::CloseKind::None:
+    case replica::CloseKind::Ended:
+      break;
+  }
+  return {};
+}
+
 }  // namespace trocar::net

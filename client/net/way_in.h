@@ -1,7 +1,7 @@
 #pragma once
 
 // How a client gets into a session: where it is, with what code, and whose certificate it must
-// have.
+// have; and how it ends with it.
 
 #include <string>
 
@@ -20,5 +20,8 @@ struct WayIn {
 
 // Sets TLS and the code; `connection` has its host and port. Errors begin with the option.
 Status set_security(const WayIn& way, NetSourceOptions& connection);
+
+// Returns how a program ends whose session was left for this reason; an error has its exit code.
+Status ending_of(const replica::CloseReason& reason);
 
 }  // namespace trocar::net

@@ -275,9 +275,7 @@ Result<ExitCode> Link::end() {
   studio_.end_session();
   if (failure_) return *failure_;
   if (is_broken) return Error{ErrorCode::BadMessage, why};
-  if (kind == replica::CloseKind::Refused) return Error{ErrorCode::Refused, why};
-  if (kind == replica::CloseKind::Unreachable || kind == replica::CloseKind::Lost)
-    return Error{ErrorCode::ResourceMissing, why};
+  if (const auto ending = net::ending_of({kind, why}); !ending) return ending.error();
   log::info("{}", why);
   return ExitCode::Ok;
 }

@@ -8,9 +8,9 @@
 //                                v
 //                             one write at a time, of what the board has then
 //
-// So a slow peer is given the newest alone, and costs a list of keys. Who takes nothing for
-// kStall, or does not end a message within that time, is cut, as is who says kMostFaults things
-// that are damaged or no message at all. Of bodies beyond kLargeBytes one is received at a time.
+// So a slow peer is given the newest alone, and costs a list of keys. A peer is cut that takes
+// nothing for kStall, does not end a message within that time, or says kMostFaults things that are
+// damaged or no message at all. Of bodies beyond kLargeBytes one is received at a time.
 // Thread: the one that runs the I/O context.
 
 #include "common/base/asio.h"  // before Boost: see there
